@@ -36,7 +36,7 @@ from kinematics.rotations import rotation_of
 from layouts import Layout
 from robots import RobotLayoutsError, TaskError
 from rollouts import Evaluation, evaluate, record
-from rollouts.progress import LiveLine
+from robots.common.progress import Progress
 from rollouts.reading.recording import Recording, Trajectory
 from tasks import Cube, Normal, Randomization
 from tasks.driving import DrivenGroup, driven_groups
@@ -100,7 +100,7 @@ def _arms(layout: Layout) -> Iterator[DrivenGroup]:
 def demonstrate(recipe: Recipe, folder: Path, workers: int | None) -> None:
     """Record the expert's episodes that are not in the folder yet."""
     how: dict[str, Any] = {"workers": workers, "randomization": shaking(recipe)}
-    with LiveLine(recipe.episodes, "episodes") as line:
+    with Progress(recipe.episodes, "episodes") as line:
         how["on_event"] = lambda so_far, _: line.update(so_far.recorded, "recording")
         record(recipe.task, range(recipe.episodes), folder, **how)
 
@@ -179,7 +179,7 @@ def observe(recipe: Recipe, recording: Path, senses: Senses) -> tuple[Tensor, Te
         file.expect_world(observer.env)
         if len(file) < recipe.episodes:
             raise TaskError(f"{recording} has {len(file)} episodes, not {recipe.episodes}")
-        with LiveLine(recipe.episodes, "episodes") as line:
+        with Progress(recipe.episodes, "episodes") as line:
             for number in range(recipe.episodes):
                 if (episode := file[number]).solved:
                     samples.append(observer(episode))
@@ -404,7 +404,7 @@ class Training:
 def learn(training: Training, policy: ClonedPolicy, examined: int, file: Path) -> None:
     """Learn all steps; examine the policy and keep everything now and then."""
     recipe, every = policy.recipe, -(-policy.recipe.steps // policy.examinations)
-    with LiveLine(recipe.steps, "batches") as line:
+    with Progress(recipe.steps, "batches") as line:
         while training.steps < recipe.steps:
             training.step()
             line.update(training.steps, "learning")
@@ -443,7 +443,7 @@ def imitate(
         training.load(file)
     learn(training, policies(recipe, training.network), options.examined, file)
     policy = policies.load(file)
-    with LiveLine(options.tests, "episodes") as line:
+    with Progress(options.tests, "episodes") as line:
         result = policy.examine(TEST_SEED, options.tests, lambda _: line.advance(1, "examining"))
     numbers = {
         "recipe": asdict(recipe),

@@ -31,7 +31,7 @@ import tasks
 from robots import TaskError
 from rollouts.export.dataset import Export, export
 from rollouts.playing.executor import choose_executor
-from rollouts.progress import LiveLine
+from robots.common.progress import Progress
 from rollouts.reading.recording import Recording
 from tasks.engine.cameras import by_place, cameras_of
 from tasks.engine.columns import ROBOMIMIC, picture_column
@@ -102,7 +102,7 @@ def draw_pictures(recording: Path, recipe: PictureRecipe, out: Path, workers: in
     if not file.exists():
         size, executor = (recipe.size, recipe.size), choose_executor(workers)
         wanted = Export(recording, "robomimic", out, cameras="all", size=size)
-        with LiveLine(recipe.episodes, "episodes") as line:
+        with Progress(recipe.episodes, "episodes") as line:
             export(wanted, lambda done, _: line.update(int(done), "drawing"), executor=executor)
     return file
 

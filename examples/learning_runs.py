@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from robots import RobotLayoutsError, TaskError
 from robots.common.writing import PARTIAL, remove, write_whole, written_whole
 from rollouts import evaluate
-from rollouts.progress import LiveLine
+from robots.common.progress import Progress
 from tasks.episode import Policy
 
 TEST_SEED = 1_000_000  # of the first test episode; the others follow
@@ -201,13 +201,13 @@ def learn(learner: Learner, run: Run, steps: int, tests: int) -> list[Point]:
             learner.begin(folder)
             write_whole(folder / "curve.json", "[]\n")
     done = int(run.latest.name.rpartition("-")[2])
-    with LiveLine(steps) as line:
+    with Progress(steps) as line:
         for number in range(done, -(-steps // learner.segment)):
             line.say(_told(_next(learner, run, number, tests, line)))
     return run.curve
 
 
-def _next(learner: Learner, run: Run, number: int, tests: int, line: LiveLine) -> Point:
+def _next(learner: Learner, run: Run, number: int, tests: int, line: Progress) -> Point:
     """Learn to the next checkpoint, and return the point of the curve that it adds."""
     steps = number * learner.segment
     curve = run.curve

@@ -31,7 +31,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 import tasks
 from robots import RobotLayoutsError
-from rollouts.progress import LiveLine
+from robots.common.progress import Progress
 
 TASK = "PushCube-v1"
 EPISODE = 50  # steps
@@ -78,7 +78,7 @@ class Examiner(BaseCallback):
         curve: What it found, in order.
     """
 
-    def __init__(self, env: VecEnv, line: LiveLine) -> None:
+    def __init__(self, env: VecEnv, line: Progress) -> None:
         """Take the environments to examine it in, one per test seed, and the line to tell on."""
         super().__init__()
         self.curve: list[Examination] = []
@@ -139,7 +139,7 @@ def learn(options: argparse.Namespace) -> list[Examination]:
         return VecNormalize(env, norm_reward=False, clip_obs=5.0)
 
     torch.set_num_threads(options.threads)
-    line = LiveLine(options.steps)
+    line = Progress(options.steps)
     with closing(make(options.envs)) as env, closing(make(options.tests)) as tests, line:
         tests.training, tests.obs_rms = False, env.obs_rms
         examiner = Examiner(tests, line)

@@ -14,7 +14,7 @@ import tasks
 from experts import find_expert
 from robots import CONTROL_MODES, TaskError
 from rollouts.reading.summary import recorded_task
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import TrajectoryError, Recording
 from tasks import MultiRobotTask
 from tasks.episode import Episode
 
@@ -65,7 +65,7 @@ def load_episodes(path: Path, task_id: str, action_dim: int) -> list[Episode]:
         TrajectoryError: If the file cannot be read or does not fit the task.
     """
     episodes: list[Episode] = []
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         file.expect(task_id, action_dim)
         for recorded in file:
             if recorded.seed is None:
@@ -103,7 +103,7 @@ def recorded_source(path: Path, cls: type[MultiRobotTask], asked: str | None = N
             different modes.
         TaskError: If it is in another mode than was asked for.
     """
-    with TrajectoryFile(path) as file:
+    with Recording(path) as file:
         mode = file.control_mode
     if not isinstance(mode, str):
         raise TrajectoryError(

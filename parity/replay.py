@@ -16,7 +16,7 @@ from parity.episodes import recorded_source
 from parity.lockstep import Run, RunResult, play
 from robots import TaskError
 from rollouts.playing.replay import find_official, task_for
-from rollouts.reading.trajectory import TrajectoryError, TrajectoryFile
+from rollouts.reading.recording import TrajectoryError, Recording
 from rollouts.recording.record import FILE, record
 
 
@@ -52,7 +52,7 @@ def replay(
             path = folder / FILE
     source = recorded_source(path, cls)
     if path.suffix == ".h5":
-        with TrajectoryFile(path) as file:
+        with Recording(path) as file:
             # Native has the layout of the task alone; a file of another one is refused.
             task_for(file, layout=cls.layout).close()
     played, mode = source.episodes[:episodes], source.control_mode

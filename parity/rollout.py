@@ -26,7 +26,7 @@ from parity.native import native_agents
 from parity.results import number_text, versions
 from parity.scene import NativeScene
 from robots.common.writing import written_whole
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import TrajectoryError
 from rollouts.video import open_video
 from tasks import MultiRobotTask
 from tasks.episode import Episode

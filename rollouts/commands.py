@@ -18,7 +18,7 @@ from rollouts.playing.command_options import (
     PictureSize,
     Players,
     Policy,
-    Recording,
+    RecordingOption,
     RecordingPath,
     stop_signals,
 )
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from layouts.viewer import Cell as ShownCell
     from layouts.viewer import Motion
     from rollouts.playing.replay import Replayed
-    from rollouts.reading.trajectory import Trajectory, TrajectoryFile
+    from rollouts.reading.recording import Trajectory, Recording
     from tasks import MultiRobotTask
 
 TELEOP_FOLDER = Path("runs/teleop")
@@ -124,7 +124,7 @@ def teleop(
 
 
 def convert(
-    recording: Recording, *, to: ControlMode, out: Folder, episodes: int | None = None
+    recording: RecordingOption, *, to: ControlMode, out: Folder, episodes: int | None = None
 ) -> int:
     """Record the episodes of a recording again in another control mode.
 
@@ -143,7 +143,7 @@ def convert(
     """
     import torch
 
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from rollouts.recording import convert as converting
 
     torch.set_num_threads(1)
@@ -151,7 +151,7 @@ def convert(
         count = _first(episodes, file)
         if not count:
             raise RecordingError(f"{file.path} has no episodes to convert")
-        with LiveLine(count, "episodes") as line:
+        with Progress(count, "episodes") as line:
             summary = converting.convert(
                 file,
                 to,
@@ -207,7 +207,7 @@ def export(
         RobotLayoutsError: If the export fails; see `rollouts.export.dataset`.
     """
     from rollouts.export import dataset
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
 
     if include_failures and only_successes:
         raise UsageError("--include-failures and --only-successes contradict each other")
@@ -227,7 +227,7 @@ def export(
     )
     in_process = players.workers == 0 and players.ray is None
     executor = None if in_process else players.executor()
-    with LiveLine(unit="episodes") as line, stop_signals():
+    with Progress(unit="episodes") as line, stop_signals():
 
         def show(done: float, total: int) -> None:
             line.total = total
@@ -271,10 +271,10 @@ def report(
     from robots.common.writing import write_whole
     from rollouts.dataset.page import render
     from rollouts.dataset.report import make_report
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
 
     torch.set_num_threads(1)
-    with LiveLine(unit="parts") as line:
+    with Progress(unit="parts") as line:
 
         def show(done: float, total: float, what: str) -> None:
             line.total = total
@@ -295,7 +295,7 @@ def report(
         print(printable(remark))
 
 
-def view(recording: Recording, *, episode: int = 0, page: Page) -> None:
+def view(recording: RecordingOption, *, episode: int = 0, page: Page) -> None:
     """Look at an episode of a recording in a browser.
 
     Shows the recorded states; where a file holds none, the actions are played again. Exit code: 0
@@ -347,10 +347,10 @@ def view_task(
             f"--demo takes no --{' and no --'.join(making)}: the recording says who stands where"
         )
     else:
-        view(Recording(demo, task=task, cell=cell), episode=episode, page=page)
+        view(RecordingOption(demo, task=task, cell=cell), episode=episode, page=page)
 
 
-def episode_cell(file: TrajectoryFile, number: int, **cell: Any) -> ShownCell:
+def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
     """Return what a page shows of an episode.
 
     Args:
@@ -363,7 +363,7 @@ def episode_cell(file: TrajectoryFile, number: int, **cell: Any) -> ShownCell:
         TrajectoryError: If there is no such episode, or it cannot be shown.
     """
     from rollouts.playing.replay import task_for
-    from rollouts.reading.trajectory import TrajectoryError
+    from rollouts.reading.recording import TrajectoryError
     from tasks.view import task_cell
 
     if not 0 <= number < len(file):
@@ -381,7 +381,7 @@ def episode_cell(file: TrajectoryFile, number: int, **cell: Any) -> ShownCell:
 
 def _motion(task: MultiRobotTask, trajectory: Trajectory) -> Motion:
     """Reset the task as the episode began, and return what happens in it."""
-    from rollouts.reading.trajectory import TrajectoryError
+    from rollouts.reading.recording import TrajectoryError
     from tasks.episode import REBUILT, play
     from tasks.view import recorded_motion
 
@@ -397,7 +397,7 @@ def _motion(task: MultiRobotTask, trajectory: Trajectory) -> Motion:
 
 
 def replay(
-    recording: Recording,
+    recording: RecordingOption,
     *,
     episodes: int | None = None,
     from_: Literal["seed", "state"] = "seed",
@@ -420,14 +420,14 @@ def replay(
     from rich.console import Console
 
     from rollouts.playing.replay import replay, task_for
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
 
     torch.set_num_threads(1)
     with recording.open() as file:
         task = task_for(file, **recording.cell.making())
         count = _first(episodes, file)
         found: list[Replayed] = []
-        with LiveLine(count, "episodes") as line:
+        with Progress(count, "episodes") as line:
             for number in range(count):
                 found.append(replay(task, file[number], from_))
                 line.advance(1, "replaying")
@@ -441,7 +441,7 @@ def replay(
     return 0 if found and all(episode.agrees for episode in found) else 1
 
 
-def _first(episodes: int | None, file: TrajectoryFile) -> int:
+def _first(episodes: int | None, file: Recording) -> int:
     """Return how many episodes of a file are asked for and there."""
     return len(file) if episodes is None else max(0, min(episodes, len(file)))
 

@@ -11,7 +11,7 @@ from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
 
 
 def evaluate(
@@ -42,9 +42,9 @@ def evaluate(
         RobotLayoutsError: If it makes no sense, or the policy fails.
     """
     from rollouts import evaluation
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
 
-    executor, line = players.executor(), LiveLine(episodes, "episodes")
+    executor, line = players.executor(), Progress(episodes, "episodes")
     with stoppable(), line:
         found = evaluation.evaluate(
             task=task,
@@ -63,7 +63,7 @@ def evaluate(
 class _Status:
     """How far the evaluation is."""
 
-    def __init__(self, line: LiveLine) -> None:
+    def __init__(self, line: Progress) -> None:
         self._line = line
         self._solved = self._played = 0
 

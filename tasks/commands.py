@@ -8,7 +8,7 @@ from typing import Annotated
 from rich.console import Console
 
 from layouts.commands import Page
-from layouts.progress import Progress
+from robots.common.progress import Progress
 from robots import RobotLayoutsError, TaskError
 from robots.common.cli import File, Word
 from robots.common.commands import print_error
@@ -121,7 +121,7 @@ def preview(
 
     target = pictures.expect_format(out)
     env = make(task, obs_mode="none", render_mode="rgb_array", **cell.making())
-    so_far = Progress(f"preview of {env.task_id}")
+    so_far = Progress(work=f"preview of {env.task_id}")
     picture = pictures.draws(
         env,
         draws,

@@ -27,11 +27,10 @@ from robots import RobotDescriptor, RobotLayoutsError
 from robots.bodies.hulls import RobotModel, load_model
 from robots.bodies.overlaps import overlapping
 from robots.from_urdf import guess_descriptor
-from robots.mjcf.compiling import compiled, mujoco
 from robots.mjcf.conversion import convert, locate
 from robots.mjcf.couplings import find_couplings
 from robots.mjcf.robot import find_robot
-from robots.mjcf.text import read_mjcf
+from robots.mjcf.reading import compiled, mujoco, read_mjcf
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree

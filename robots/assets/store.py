@@ -20,7 +20,7 @@ from filelock import FileLock, Timeout
 from robots.assets.manifest import AssetFile
 from robots.assets.progress import say
 from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.fields import settle
+from robots.common.schema import check
 from robots.common.files import open_regular, read_json
 from robots.common.paths import ROOT_VARIABLE
 from robots.common.writing import remove, written_whole
@@ -108,7 +108,7 @@ class AssetStore:
         path = self.root / _RECORD
         try:
             value = read_json(path, _LARGEST_RECORD)
-            return dict(settle(value, Mapping[str, FetchedFile], "it", AssetError))
+            return dict(check(value, Mapping[str, FetchedFile], "it", AssetError))
         except UnreadableFileError as error:
             if error.errno in _ABSENT:
                 return {}

@@ -13,7 +13,7 @@ from rollouts.playing.command_options import GOES_ON, Players, Recording, stoppa
 if TYPE_CHECKING:
     from rollouts.dataset.certificate import Certificate
     from rollouts.playing.executor import Event
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
 
 
 def certify(
@@ -40,7 +40,7 @@ def certify(
     from rollouts.dataset import certify as certifying
     from rollouts.dataset.certificate import sentences
     from rollouts.playing.replay import find_official
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from tasks import get_task_class
 
     path = recording.file
@@ -48,7 +48,7 @@ def certify(
         if recording.task is None:
             raise TaskError("neither a recording nor a task is given to certify")
         path = find_official(get_task_class(recording.task).task_id)
-    executor, line = players.executor(), LiveLine(unit="episodes")
+    executor, line = players.executor(), Progress(unit="episodes")
     with stoppable(lambda: GOES_ON), line:
         certificate = certifying.certify(
             path,
@@ -67,7 +67,7 @@ def certify(
 class _Status:
     """How far it is, and what happens on the way."""
 
-    def __init__(self, line: LiveLine) -> None:
+    def __init__(self, line: Progress) -> None:
         self._line = line
 
     def show(self, certificate: Certificate, event: Event | None) -> None:

@@ -19,7 +19,7 @@ from tasks.cell_options import RecordedCell
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Executor
-    from rollouts.reading.trajectory import TrajectoryFile
+    from rollouts.reading.recording import Recording
 
 INTERRUPTED = 130  # exit code, as shells have it
 GOES_ON = "stopped; the same command goes on from there"
@@ -116,7 +116,7 @@ class Players:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recording:
+class RecordingOption:
     """Which recording a command is about.
 
     Attributes:
@@ -130,7 +130,7 @@ class Recording:
     task: str | None = None
     cell: RecordedCell
 
-    def open(self) -> AbstractContextManager[TrajectoryFile]:
+    def open(self) -> AbstractContextManager[Recording]:
         """Open it; see `rollouts.playing.replay.open_recording`."""
         from rollouts.playing.replay import open_recording
 

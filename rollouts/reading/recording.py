@@ -36,7 +36,7 @@ from rollouts.reading.provenance import (
     listing,
     read_described,
 )
-from rollouts.reading.summary import MAX_STEPS, OWN_EPISODE, Entry, TrajectoryError, read_summary
+from rollouts.reading.summary import MAX_STEPS, OwnEpisode, Entry, TrajectoryError, read_summary
 from tasks import MultiRobotTask
 from tasks.episode import States
 from tasks.native.controllers import CONTROLLER
@@ -351,7 +351,7 @@ class _File:
             texts = self.hdf5.texts(entry.group, (*TEXTS, CHECKSUM))
             if texts is None:
                 self.refuse(entry, "the json beside it lists it, but it is not in the file")
-            own = read_described(texts, "episode", OWN_EPISODE)
+            own = read_described(texts, "episode", OwnEpisode)
         if own is not None and own["episode_seed"] != entry.episode_seed:
             self.refuse(
                 entry,

@@ -14,7 +14,7 @@ from tasks.cell_options import PlacedRobot, chosen_robots
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from rollouts.receipts.receipt import Receipt
 
 
@@ -44,7 +44,7 @@ def verify(
     Raises:
         RobotLayoutsError: If it cannot be played again.
     """
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from rollouts.receipts import verification
     from rollouts.receipts.receipt import Receipt
 
@@ -52,7 +52,7 @@ def verify(
     known = chosen_robots(robots) if robots else {}
     if isinstance(known, RobotDescriptor):
         known = dict.fromkeys(read.making["layout"], known)
-    executor, line = players.executor(), LiveLine(len(read.episodes), "episodes")
+    executor, line = players.executor(), Progress(len(read.episodes), "episodes")
     with stoppable(), line:
         found = verification.verify(
             read,
@@ -77,7 +77,7 @@ _VERDICT = {
 class _Status:
     """How far it is."""
 
-    def __init__(self, line: LiveLine, receipt: Receipt) -> None:
+    def __init__(self, line: Progress, receipt: Receipt) -> None:
         self._line = line
         self._states = {episode.seed: episode.states for episode in receipt.episodes}
         self._played = self._equal = 0

@@ -22,7 +22,7 @@ from robots.common.files import open_regular, parse_json, read_text
 from robots.common.writing import write_whole, written_whole
 from rollouts.reading.damage import damage_errors
 from rollouts.reading.hdf5 import Hdf5File
-from rollouts.reading.json_fields import FieldError
+from robots.common.schema import FieldError
 from rollouts.reading.manifest import (
     FILE_NUMBER,
     FileEntry,
@@ -43,7 +43,7 @@ from rollouts.reading.provenance import (
     numbered,
     read_described,
 )
-from rollouts.reading.summary import MAX_JSON, OWN_EPISODE, TrajectoryError
+from rollouts.reading.summary import MAX_JSON, OwnEpisode, TrajectoryError
 from rollouts.recording.disk import DiskFile, disk_errors
 from rollouts.recording.episode_files import Stored, read_part
 from rollouts.sources.actors import Source, combined, source_of
@@ -430,7 +430,7 @@ def _read_episode(file: Hdf5File, name: str) -> Stored:
     own = attributes.pop(CHECKSUM, None)  # an earlier version wrote none
     if own not in (None, checksum(attributes, arrays)):
         raise FieldError(f"the checksum of {name} is another")
-    if read_described(attributes, "episode", OWN_EPISODE) is None:
+    if read_described(attributes, "episode", OwnEpisode) is None:
         raise FieldError(f"{name} has no attribute 'episode'")
     return Stored(attributes, arrays)
 

@@ -23,7 +23,7 @@ from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from rollouts.recording.record import Summary
 
 
@@ -73,11 +73,11 @@ def record(
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
     from rollouts.playing.executor import WorkerError
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from rollouts.recording import record as recording
 
     seeds = range(seed, seed + episodes)
-    executor, line = players.executor(), LiveLine(len(seeds), "episodes")
+    executor, line = players.executor(), Progress(len(seeds), "episodes")
     status = _Status(line)
 
     def goes_on() -> str:
@@ -104,7 +104,7 @@ def record(
 class _Status:
     """How far the recording is, and what happens on the way."""
 
-    def __init__(self, line: LiveLine) -> None:
+    def __init__(self, line: Progress) -> None:
         self._line = line
         self._summary: Summary | None = None
 

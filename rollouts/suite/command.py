@@ -12,7 +12,7 @@ from rollouts.playing.command_options import GOES_ON, Players, stoppable
 
 if TYPE_CHECKING:
     from rollouts.playing.executor import Event
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from rollouts.suite.suite import Case
 
 SuiteName = Annotated[str, Word("SUITE")]
@@ -63,14 +63,14 @@ def run(
     Raises:
         RobotLayoutsError: If a suite or a policy makes no sense.
     """
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from rollouts.suite.files import load_suite
     from rollouts.suite.run import chosen_cases, run_suite
     from rollouts.suite.tables import summary
 
     loaded = load_suite(suite, import_tasks=True)
     episodes = sum(len(case.seeds) for case in chosen_cases(loaded, only))
-    with stoppable(lambda: GOES_ON), LiveLine(episodes, "episodes") as line:
+    with stoppable(lambda: GOES_ON), Progress(episodes, "episodes") as line:
         found = run_suite(
             loaded,
             out,
@@ -126,14 +126,14 @@ def verify(folder: RunFolder, *, policy: Policies = (), task: Tasks = (), player
     Raises:
         RobotLayoutsError: If a run or a policy makes no sense.
     """
-    from rollouts.progress import LiveLine
+    from robots.common.progress import Progress
     from rollouts.suite.folder import read_run
     from rollouts.suite.run import verify_run
 
     _import_tasks(task)
     played = read_run(folder)
     episodes = sum(len(receipt.episodes) for receipt in played.receipts.values())
-    with stoppable(), LiveLine(episodes, "episodes") as line:
+    with stoppable(), Progress(episodes, "episodes") as line:
         found = verify_run(
             played,
             _policies(policy),
@@ -180,7 +180,7 @@ def _policies(words: Sequence[str]) -> dict[str, str] | None:
 class _Status:
     """How far it is, over all cases."""
 
-    def __init__(self, line: LiveLine) -> None:
+    def __init__(self, line: Progress) -> None:
         self._line = line
         self._played = self._solved = self._before = 0
 

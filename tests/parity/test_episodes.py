@@ -15,7 +15,7 @@ from parity.episodes import (
     recorded_source,
 )
 from robots import TaskError
-from rollouts.reading.trajectory import TrajectoryError
+from rollouts.reading.recording import TrajectoryError
 
 TASK = "PickCube-v1"
 
