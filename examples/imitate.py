@@ -35,8 +35,8 @@ import tasks
 from kinematics.rotations import rotation_of
 from layouts import Layout
 from robots import RobotLayoutsError, TaskError
-from rollouts import Evaluation, evaluate, record
 from robots.common.progress import Progress
+from rollouts import Evaluation, evaluate, record
 from rollouts.reading.recording import Recording, Trajectory
 from tasks import Cube, Normal, Randomization
 from tasks.driving import DrivenGroup, driven_groups

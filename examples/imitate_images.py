@@ -29,9 +29,9 @@ from torch import Tensor, nn
 
 import tasks
 from robots import TaskError
+from robots.common.progress import Progress
 from rollouts.export.dataset import Export, export
 from rollouts.playing.executor import choose_executor
-from robots.common.progress import Progress
 from rollouts.reading.recording import Recording
 from tasks.engine.cameras import by_place, cameras_of
 from tasks.engine.columns import ROBOMIMIC, picture_column

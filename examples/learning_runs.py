@@ -25,9 +25,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from robots import RobotLayoutsError, TaskError
+from robots.common.progress import Progress
 from robots.common.writing import PARTIAL, remove, write_whole, written_whole
 from rollouts import evaluate
-from robots.common.progress import Progress
 from tasks.episode import Policy
 
 TEST_SEED = 1_000_000  # of the first test episode; the others follow

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 import tasks
 from experts import find_expert
 from robots import CONTROL_MODES, TaskError
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.reading.summary import recorded_task
-from rollouts.reading.recording import TrajectoryError, Recording
 from tasks import MultiRobotTask
 from tasks.episode import Episode
 

@@ -16,7 +16,7 @@ from parity.episodes import recorded_source
 from parity.lockstep import Run, RunResult, play
 from robots import TaskError
 from rollouts.playing.replay import find_official, task_for
-from rollouts.reading.recording import TrajectoryError, Recording
+from rollouts.reading.recording import Recording, TrajectoryError
 from rollouts.recording.record import FILE, record
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from layouts.viewer import Cell as ShownCell
     from layouts.viewer import Motion
     from rollouts.playing.replay import Replayed
-    from rollouts.reading.recording import Trajectory, Recording
+    from rollouts.reading.recording import Recording, Trajectory
     from tasks import MultiRobotTask
 
 TELEOP_FOLDER = Path("runs/teleop")
@@ -206,8 +206,8 @@ def export(
     Raises:
         RobotLayoutsError: If the export fails; see `rollouts.export.dataset`.
     """
-    from rollouts.export import dataset
     from robots.common.progress import Progress
+    from rollouts.export import dataset
 
     if include_failures and only_successes:
         raise UsageError("--include-failures and --only-successes contradict each other")
@@ -268,10 +268,10 @@ def report(
     """
     import torch
 
+    from robots.common.progress import Progress
     from robots.common.writing import write_whole
     from rollouts.dataset.page import render
     from rollouts.dataset.report import make_report
-    from robots.common.progress import Progress
 
     torch.set_num_threads(1)
     with Progress(unit="parts") as line:
@@ -419,8 +419,8 @@ def replay(
     import torch
     from rich.console import Console
 
-    from rollouts.playing.replay import replay, task_for
     from robots.common.progress import Progress
+    from rollouts.playing.replay import replay, task_for
 
     torch.set_num_threads(1)
     with recording.open() as file:

@@ -10,8 +10,8 @@ from rollouts.playing.command_options import Acting, Players, stoppable
 from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
-    from rollouts.playing.executor import Event
     from robots.common.progress import Progress
+    from rollouts.playing.executor import Event
 
 
 def evaluate(
@@ -41,8 +41,8 @@ def evaluate(
     Raises:
         RobotLayoutsError: If it makes no sense, or the policy fails.
     """
-    from rollouts import evaluation
     from robots.common.progress import Progress
+    from rollouts import evaluation
 
     executor, line = players.executor(), Progress(episodes, "episodes")
     with stoppable(), line:

@@ -29,8 +29,8 @@ from robots.bodies.overlaps import overlapping
 from robots.from_urdf import guess_descriptor
 from robots.mjcf.conversion import convert, locate
 from robots.mjcf.couplings import find_couplings
-from robots.mjcf.robot import find_robot
 from robots.mjcf.reading import compiled, mujoco, read_mjcf
+from robots.mjcf.robot import find_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree

@@ -20,9 +20,9 @@ from filelock import FileLock, Timeout
 from robots.assets.manifest import AssetFile
 from robots.assets.progress import say
 from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.schema import check
 from robots.common.files import open_regular, read_json
 from robots.common.paths import ROOT_VARIABLE
+from robots.common.schema import check
 from robots.common.writing import remove, written_whole
 
 _LOCK, _PARTIAL, _RECORD = ".lock", ".partial", "fetched.json"

@@ -11,9 +11,9 @@ from robots.common.commands import printable
 from rollouts.playing.command_options import GOES_ON, Players, Recording, stoppable
 
 if TYPE_CHECKING:
+    from robots.common.progress import Progress
     from rollouts.dataset.certificate import Certificate
     from rollouts.playing.executor import Event
-    from robots.common.progress import Progress
 
 
 def certify(
@@ -37,10 +37,10 @@ def certify(
     Raises:
         RobotLayoutsError: If it cannot be certified.
     """
+    from robots.common.progress import Progress
     from rollouts.dataset import certify as certifying
     from rollouts.dataset.certificate import sentences
     from rollouts.playing.replay import find_official
-    from robots.common.progress import Progress
     from tasks import get_task_class
 
     path = recording.file

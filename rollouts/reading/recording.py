@@ -36,7 +36,7 @@ from rollouts.reading.provenance import (
     listing,
     read_described,
 )
-from rollouts.reading.summary import MAX_STEPS, OwnEpisode, Entry, TrajectoryError, read_summary
+from rollouts.reading.summary import MAX_STEPS, Entry, OwnEpisode, TrajectoryError, read_summary
 from tasks import MultiRobotTask
 from tasks.episode import States
 from tasks.native.controllers import CONTROLLER

@@ -13,8 +13,8 @@ from rollouts.playing.command_options import Players, Policy, stoppable
 from tasks.cell_options import PlacedRobot, chosen_robots
 
 if TYPE_CHECKING:
-    from rollouts.playing.executor import Event
     from robots.common.progress import Progress
+    from rollouts.playing.executor import Event
     from rollouts.receipts.receipt import Receipt
 
 

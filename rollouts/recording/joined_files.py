@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from robots import RecordingError, UnreadableFileError
 from robots.common.files import open_regular, parse_json, read_text
+from robots.common.schema import FieldError
 from robots.common.writing import write_whole, written_whole
 from rollouts.reading.damage import damage_errors
 from rollouts.reading.hdf5 import Hdf5File
-from robots.common.schema import FieldError
 from rollouts.reading.manifest import (
     FILE_NUMBER,
     FileEntry,

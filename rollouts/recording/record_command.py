@@ -22,8 +22,8 @@ from rollouts.reading.manifest import FILE_SIZE
 from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
-    from rollouts.playing.executor import Event
     from robots.common.progress import Progress
+    from rollouts.playing.executor import Event
     from rollouts.recording.record import Summary
 
 
@@ -72,8 +72,8 @@ def record(
     Raises:
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
-    from rollouts.playing.executor import WorkerError
     from robots.common.progress import Progress
+    from rollouts.playing.executor import WorkerError
     from rollouts.recording import record as recording
 
     seeds = range(seed, seed + episodes)

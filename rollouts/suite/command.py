@@ -11,8 +11,8 @@ from robots.common.commands import printable
 from rollouts.playing.command_options import GOES_ON, Players, stoppable
 
 if TYPE_CHECKING:
-    from rollouts.playing.executor import Event
     from robots.common.progress import Progress
+    from rollouts.playing.executor import Event
     from rollouts.suite.suite import Case
 
 SuiteName = Annotated[str, Word("SUITE")]
