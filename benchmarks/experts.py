@@ -33,7 +33,7 @@ from experts.touching import ArmWatch
 from layouts import Layout, ring, search
 from layouts.frames import Frame
 from robots import LayoutError, TaskError
-from tasks import MultiRobotTask, get_task_class, make
+from tasks import TaskEnv, get_task_class, make
 from tasks.episode import play
 
 Area = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]  # x, y, z (m)
@@ -171,7 +171,7 @@ def _played(
                 yield from _play(task, other["episodes"], layout_seeds)
 
 
-def _play(task: MultiRobotTask, episodes: Record, seeds: int) -> Iterator[None]:
+def _play(task: TaskEnv, episodes: Record, seeds: int) -> Iterator[None]:
     expert, arms = find_expert(task.task_id), ArmWatch(task)
     with closing(task):
         for seed in range(seeds):
@@ -180,7 +180,7 @@ def _play(task: MultiRobotTask, episodes: Record, seeds: int) -> Iterator[None]:
                 yield
 
 
-def _episode(task: MultiRobotTask, seed: int, expert: Any, arms: ArmWatch) -> Record:
+def _episode(task: TaskEnv, seed: int, expert: Any, arms: ArmWatch) -> Record:
     """Return whether an expert's plan succeeds, its steps, and which arms touched."""
     try:
         plan = expert(task, seed)

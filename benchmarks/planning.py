@@ -296,7 +296,9 @@ class Place:
         ``stray`` is how far any link was from the plan (m), ``late`` how much longer it took (s).
         """
         task, touching = self.task, dict[str, None]()
-        task.starts = {name: rows[0] for name, rows in motion.positions.items()}
+        task.task.starts = {  # pyright: ignore[reportAttributeAccessIssue]
+            name: rows[0] for name, rows in motion.positions.items()
+        }
         task.reset(0)
 
         def watch() -> None:

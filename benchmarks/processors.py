@@ -37,7 +37,7 @@ from experts import find_expert
 from robots import DescriptorError, SimulationError, TaskError
 from robots.common.portable import FIXED, GLIBC, NUMPY, portable_variables
 from robots.portable import numpy_versions
-from tasks import MultiRobotTask, list_tasks, make
+from tasks import TaskEnv, list_tasks, make
 from tasks.episode import REBUILT
 from tasks.varying.streams import Stream
 
@@ -273,7 +273,7 @@ def digests(played: Played) -> Digests | None:
     return found
 
 
-def _actions(task: MultiRobotTask, played: Played) -> Sequence[Any] | NDArray[np.float32]:
+def _actions(task: TaskEnv, played: Played) -> Sequence[Any] | NDArray[np.float32]:
     if played.control == EXPERT:
         return np.asarray(find_expert(played.task)(task, played.seed), np.float32)
     space = task.single_action_space

@@ -19,7 +19,7 @@ from robots.action_split import is_gripper
 from robots.urdf.tcp import find_tcp
 from simulation.backend import Overlap
 from simulation.checks.overlaps import between_robots, deepest
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.driving import driven_groups, joint_slices
 
 WAIT = 40  # control steps without progress, after which something is in the way
@@ -67,7 +67,7 @@ class Follower:
     """
 
     def __init__(
-        self, task: MultiRobotTask, motion: Motion, grippers: Mapping[str, float] | None = None
+        self, task: TaskEnv, motion: Motion, grippers: Mapping[str, float] | None = None
     ) -> None:
         """Take what is to be done.
 
@@ -159,7 +159,7 @@ class Follower:
 
 
 def follow(
-    task: MultiRobotTask,
+    task: TaskEnv,
     motion: Motion,
     grippers: Mapping[str, float] | None = None,
     *,
@@ -208,7 +208,7 @@ def follow(
     return Followed(rows, *errors, late, tuple(contacts.values()))
 
 
-def _check_task(task: MultiRobotTask, motion: Motion) -> None:
+def _check_task(task: TaskEnv, motion: Motion) -> None:
     if task.num_envs != 1:
         raise TaskError(f"a motion is followed in 1 environment; the task has {task.num_envs}")
     state = task.simulation.read()

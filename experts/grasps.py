@@ -13,7 +13,7 @@ from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 from experts.tips import pose_solver
 from kinematics.rotations import Floats, inverse, multiply, rotate
 from robots import TaskError
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 Numbers = Sequence[float] | Floats
 
@@ -27,7 +27,7 @@ PLACE_YAWS = sorted((*YAWS, -pi / 2, pi / 2, pi), key=abs)
 TILTS = tuple(np.radians((20, 10, 0, 30, 40, 50, 60, -15)))
 
 
-def need_fingers(task: MultiRobotTask, plan: str, *robots: str) -> None:
+def need_fingers(task: TaskEnv, plan: str, *robots: str) -> None:
     """Make sure that robots can grasp.
 
     Args:
@@ -74,7 +74,7 @@ def cube_grip_from(cube: Pose, base: Floats, tilt: float) -> Pose:
 
 
 def grips_to(
-    task: MultiRobotTask,
+    task: TaskEnv,
     robot: str,
     body: str,
     place: Callable[[Scene], Floats],
@@ -120,7 +120,7 @@ def grips_to(
 
 
 def lowerable(
-    task: MultiRobotTask, robot: str, poses: Callable[[Scene], Sequence[Pose]], way: float
+    task: TaskEnv, robot: str, poses: Callable[[Scene], Sequence[Pose]], way: float
 ) -> Callable[[Scene], list[Pose]]:
     """Return those of some poses of a gripper from which it can be lowered.
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from kinematics.rotations import Floats, inverse, multiply
 from simulation import State
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.driving import DrivenGroup, TcpDrive, VelocityDrive, drive_of
 
 NEAR = 0.005  # rad, m; as near to their end are joints that have arrived
@@ -42,7 +42,7 @@ class MotionDrive:
     way from what earlier steps missed.
     """
 
-    def __init__(self, driven: DrivenGroup, task: MultiRobotTask, *, moves: bool) -> None:
+    def __init__(self, driven: DrivenGroup, task: TaskEnv, *, moves: bool) -> None:
         """Take the group.
 
         Args:

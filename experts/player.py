@@ -15,7 +15,7 @@ from experts.ways import NoWayError, Ways
 from kinematics.rotations import Floats, inverse, rotate
 from kinematics.solve import by_way
 from simulation.checks.overlaps import RobotsAlone
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 PATIENCE = 40  # control steps without progress after which an arm counts as blocked
 PROGRESS = 1e-3  # rad
@@ -36,7 +36,7 @@ class Player:
 
     def __init__(
         self,
-        task: MultiRobotTask,
+        task: TaskEnv,
         robot: str,
         waypoints: Sequence[Waypoint],
         scene: Scene,

@@ -9,14 +9,14 @@ from typing import Any
 from experts.geometry import gripper_facing, heading
 from experts.script import Pose, Scene, Waypoint
 from kinematics.rotations import Floats
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 POSE_JOINTS = 6  # of an arm that can choose how its TCP is turned
 LEANS = (0.0, pi / 6, pi / 3, pi / 2, -pi / 6)  # from straight down (rad)
 
 
 def reaching(
-    task: MultiRobotTask,
+    task: TaskEnv,
     robot: str,
     name: str,
     place: Callable[[Scene], Floats],

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from robots import TaskError
 from robots.common.bounds import shown
 from robots.common.catalogue import Catalogue
-from tasks import MultiRobotTask, get_task_class
+from tasks import TaskEnv, get_task_class
 
-Expert = Callable[[MultiRobotTask, int], NDArray[np.float32]]
+Expert = Callable[[TaskEnv, int], NDArray[np.float32]]
 """``expert(task, seed)`` returns actions (T, A) for the episode that ``seed`` begins.
 
 The task says which layout and physics to plan for and is itself left alone: experts plan in worlds

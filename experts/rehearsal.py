@@ -17,7 +17,7 @@ from experts.touching import ArmWatch
 from experts.ways import Ways, without_planner
 from robots import TaskError, UnknownNameError
 from simulation.checks.overlaps import RobotsAlone
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.engine.actions import ActionReader
 from tasks.episode import REBUILT, EpisodeTape, PlayedEpisode, take_step
 
@@ -52,19 +52,17 @@ class Plan(NDArray[np.float32] if TYPE_CHECKING else np.ndarray):
 
     reason: str = ""
     episode: PlayedEpisode | None = None
-    task: Callable[[], MultiRobotTask | None] = staticmethod(lambda: None)
+    task: Callable[[], TaskEnv | None] = staticmethod(lambda: None)
 
     @classmethod
-    def of(cls, attempt: Attempt, task: MultiRobotTask) -> Plan:
+    def of(cls, attempt: Attempt, task: TaskEnv) -> Plan:
         """Return the plan that an attempt at a task made."""
         plan = attempt.actions.view(cls)
         plan.reason, plan.episode, plan.task = attempt.reason, attempt.episode, ref(task)
         return plan
 
 
-def rehearsed(
-    task: MultiRobotTask, seed: int, actions: NDArray[np.float32]
-) -> PlayedEpisode | None:
+def rehearsed(task: TaskEnv, seed: int, actions: NDArray[np.float32]) -> PlayedEpisode | None:
     """Return the episode of a task that a plan's rehearsal was; None if it has to be played first.
 
     A rehearsal begins in a freshly built world, with the physics and rewards of the task that is
@@ -80,7 +78,7 @@ def rehearsed(
 class Rehearsal:
     """A private copy of a task, in which scripts are tried out from fresh worlds."""
 
-    def __init__(self, task: MultiRobotTask) -> None:
+    def __init__(self, task: TaskEnv) -> None:
         """Build one environment with layout, physics and rewards of ``task``, without pictures."""
         scenario = replace(
             task.scenario,
@@ -89,7 +87,7 @@ class Rehearsal:
             render_mode=None,
             check_layout=False,  # it was checked when the task was made
         )
-        self.task = type(task)(scenario)
+        self.task = task.task_class(scenario)
         several = len(self.task.layout.arms) > 1
         self._watch = ArmWatch(self.task, strict=False) if several else None
         self._alone = RobotsAlone(self.task.layout, scenario.physics)
@@ -170,11 +168,11 @@ class Rehearsal:
 
 
 # Making one takes as long as half an episode, and each episode begins in a world built anew.
-_idle: WeakKeyDictionary[MultiRobotTask, Rehearsal] = WeakKeyDictionary()
+_idle: WeakKeyDictionary[TaskEnv, Rehearsal] = WeakKeyDictionary()
 
 
 @contextmanager
-def rehearsing(task: MultiRobotTask) -> Generator[Rehearsal]:
+def rehearsing(task: TaskEnv) -> Generator[Rehearsal]:
     """Lend the private copy of a task, which lasts as long as the task does.
 
     One that is lent already, or was left by an error, is not lent again: another is made.
@@ -184,9 +182,7 @@ def rehearsing(task: MultiRobotTask) -> Generator[Rehearsal]:
     _idle[task] = rehearsal
 
 
-def _players(
-    task: MultiRobotTask, script: Script, scene: Scene, alone: RobotsAlone
-) -> list[Player]:
+def _players(task: TaskEnv, script: Script, scene: Scene, alone: RobotsAlone) -> list[Player]:
     """Return who takes the action numbers, in their order, by the names that the script uses."""
     short = task.layout.short_names
     names = {short.get(name, name): name for name in script}
@@ -196,9 +192,7 @@ def _players(
     ]
 
 
-def first_success(
-    task: MultiRobotTask, seed: int, scripts: Callable[[Scene], Sequence[Script]]
-) -> Plan:
+def first_success(task: TaskEnv, seed: int, scripts: Callable[[Scene], Sequence[Script]]) -> Plan:
     """Try scripts one after the other and return the actions of the first that succeeds.
 
     If none does, those in which arms touched, or something blocked one, are tried once more, with
@@ -234,9 +228,7 @@ def first_success(
     return search(task, seed, attempts)
 
 
-def search(
-    task: MultiRobotTask, seed: int, attempts: Callable[[Rehearsal], Iterable[Attempt]]
-) -> Plan:
+def search(task: TaskEnv, seed: int, attempts: Callable[[Rehearsal], Iterable[Attempt]]) -> Plan:
     """Make attempts until one succeeds and return its actions.
 
     If none does, the actions of the longest attempt are returned: it got furthest.
@@ -264,7 +256,7 @@ def search(
     return Plan.of(best, task)
 
 
-def rehearse(task: MultiRobotTask, seed: int, act: Callable[[Scene], Any]) -> Plan:
+def rehearse(task: TaskEnv, seed: int, act: Callable[[Scene], Any]) -> Plan:
     """Let a function act in a private copy of a task until it succeeds or the episode ends.
 
     It also ends, and has failed, when two arms touch: robots, or limbs of one robot.
@@ -299,11 +291,11 @@ def _closed_loop(rehearsal: Rehearsal, seed: int, act: Callable[[Scene], Any]) -
     return Attempt(done, success, reason, episode=rehearsal.episode(done))
 
 
-def _stack(actions: list[NDArray[np.float32]], task: MultiRobotTask) -> NDArray[np.float32]:
+def _stack(actions: list[NDArray[np.float32]], task: TaskEnv) -> NDArray[np.float32]:
     return np.array(actions, np.float32).reshape(-1, task.layout.action_dim)
 
 
-def _check_names(script: Script, task: MultiRobotTask) -> None:
+def _check_names(script: Script, task: TaskEnv) -> None:
     for robot in script:
         if task.layout.arm_name(robot) not in task.layout.action_split:
             raise UnknownNameError("arm that takes numbers", robot, task.layout.places)

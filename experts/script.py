@@ -13,7 +13,7 @@ from experts.tips import gripper_turn
 from kinematics.rotations import Floats, multiply
 from simulation import State
 from simulation.world import Body
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 OPEN, CLOSED = 1.0, -1.0
 
@@ -28,7 +28,7 @@ class Scene:
         bodies: What the task put into the world, as declared.
     """
 
-    def __init__(self, task: MultiRobotTask) -> None:
+    def __init__(self, task: TaskEnv) -> None:
         """Look at the first world of a task as it is now."""
         self._state: State = task.simulation.read()
         self._layout = task.standing()

@@ -19,7 +19,7 @@ from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
 from simulation.backend import PointSolver, PoseSolver
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 _TURN_WORTH = 0.01  # m of error that a turn by 1 rad is worth: place comes first
 _PLACE, _TURN = 0.003, 0.35  # m and rad that may be missing
@@ -79,7 +79,7 @@ class TipSolver:
         return [found] if fits else []
 
 
-def pose_solver(task: MultiRobotTask, robot: str) -> PoseSolver | TipSolver:
+def pose_solver(task: TaskEnv, robot: str) -> PoseSolver | TipSolver:
     """Return what finds arm joints for poses of a robot's gripper, whatever its TCP is.
 
     Args:

@@ -10,7 +10,7 @@ from motion.collision.checker import Checker
 from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError
 from simulation.scene.parts import Part
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 _UNSEEN = (
     "hands of robots that overlap are not seen, so plans may be others than elsewhere: python-fcl"
@@ -26,7 +26,7 @@ class ArmWatch:
     `simulation.World`); there overlaps of their shapes count, too, as they are when it is asked.
     """
 
-    def __init__(self, task: MultiRobotTask, *, strict: bool = True) -> None:
+    def __init__(self, task: TaskEnv, *, strict: bool = True) -> None:
         """Watch a task from now on.
 
         Args:

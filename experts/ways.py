@@ -20,7 +20,7 @@ from motion.planning.space import Resolution, Space
 from robots.bodies.hulls import require_packages
 from robots.common.errors import MissingPackageError, NoPlanError
 from robots.common.progress import Progress
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 CLEARANCE = 0.02  # m
 RESOLUTION: Resolution = (0.02, 0.1)  # m and rad
@@ -49,7 +49,7 @@ class NoWayError(Exception):
 class Ways:
     """Finds ways for the arms of a task, given where the others are and go."""
 
-    def __init__(self, task: MultiRobotTask) -> None:
+    def __init__(self, task: TaskEnv) -> None:
         """Take a task: where its robots stand, and its bodies as scenes show them."""
         self._layout = task.standing()
         self._alone = Cell(self._layout)

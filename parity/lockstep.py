@@ -17,7 +17,7 @@ import tasks
 from parity.native import make_native, native_action, native_action_dim, quiet
 from robots import CONTROL_MODES, TaskError
 from simulation.sapien3.contacts import presses_on_object
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.episode import Episode
 
 Floats = NDArray[np.float32]
@@ -185,7 +185,7 @@ class Side(Protocol):
 class OurSide:
     """A task of this library."""
 
-    def __init__(self, env: MultiRobotTask) -> None:
+    def __init__(self, env: TaskEnv) -> None:
         """Take a task that was just made."""
         self.env = env
         self.num_envs = env.num_envs

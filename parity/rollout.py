@@ -28,7 +28,7 @@ from parity.scene import NativeScene
 from robots.common.writing import written_whole
 from rollouts.reading.recording import TrajectoryError
 from rollouts.video import open_video
-from tasks import MultiRobotTask
+from tasks import MultiRobotTask, TaskEnv
 from tasks.episode import Episode
 from tasks.native.format import articulation_keys
 
@@ -193,7 +193,7 @@ def _name(quantity: str, entry: str, robots: Mapping[str, str]) -> str:
 
 
 def _play_native(
-    env: MultiRobotTask, episode: Episode, film: Path | None, on_step: Callable[[], object]
+    env: TaskEnv, episode: Episode, film: Path | None, on_step: Callable[[], object]
 ) -> Arrays:
     mode, size = str(env.control_mode), PICTURE_SIZE if film else None
     keys = articulation_keys(env.layout)
@@ -220,12 +220,12 @@ def _native_tcp_pose(agent: Any) -> NDArray[np.float32]:
     return pose.raw_pose[0].numpy().copy()
 
 
-def _our_tcp_poses(env: MultiRobotTask) -> Arrays:
+def _our_tcp_poses(env: TaskEnv) -> Arrays:
     state = env.simulation.read()
     return {robot: state.tcp_pose(robot)[0].copy() for robot in env.layout}
 
 
-def _describe(env: MultiRobotTask, source: Source, name: str) -> dict[str, Any]:
+def _describe(env: TaskEnv, source: Source, name: str) -> dict[str, Any]:
     """Return what a file says about its arrays, as plain data."""
     seed = source.episodes[0].seed
     return {

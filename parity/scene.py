@@ -12,7 +12,7 @@ from parity.lockstep import Snapshot, state_dict
 from parity.native import quiet
 from robots import RobotLayoutsError
 from simulation.sapien3.collision import described_shapes
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 Picture = NDArray[np.uint8]  # (H, W, 3), red, green, blue
 
@@ -66,7 +66,7 @@ class NativeScene:
                     raise PictureError(f"{name} cannot be drawn: its state is {rows[0].tolist()}")
 
 
-def expect_same_shapes(env: Any, task: MultiRobotTask) -> None:
+def expect_same_shapes(env: Any, task: TaskEnv) -> None:
     """Refuse to draw bodies of ours in native's scene if native's have other shapes.
 
     A task may draw geometry anew for every episode, and the state dict does not tell it.

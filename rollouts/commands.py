@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from layouts.viewer import Motion
     from rollouts.playing.replay import Replayed
     from rollouts.reading.recording import Recording, Trajectory
-    from tasks import MultiRobotTask
+    from tasks import TaskEnv
 
 TELEOP_FOLDER = Path("runs/teleop")
 
@@ -379,7 +379,7 @@ def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
         task.close()
 
 
-def _motion(task: MultiRobotTask, trajectory: Trajectory) -> Motion:
+def _motion(task: TaskEnv, trajectory: Trajectory) -> Motion:
     """Reset the task as the episode began, and return what happens in it."""
     from rollouts.reading.recording import TrajectoryError
     from tasks.episode import REBUILT, play

@@ -22,7 +22,7 @@ from robots import AssetError, MissingPackageError, RecordingError, TaskError
 from robots.common.pages import plural
 from rollouts.recording.recorder import Recorder
 from rollouts.video import film, video_problem
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.episode import PlayedEpisode, Score, play
 from tasks.registry import make_scenario
 
@@ -172,7 +172,7 @@ def _report(
 
 def _film(options: DemoOptions, episodes: Sequence[PlayedEpisode], console: Console) -> None:
     path = options.out / "video.mp4"
-    task: MultiRobotTask = tasks.make(options.task, render_mode="rgb_array", **options.making)
+    task: TaskEnv = tasks.make(options.task, render_mode="rgb_array", **options.making)
     with _live(console) as live:
         line = live.add_task("video")
         shown = film(

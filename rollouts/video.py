@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from robots import MissingPackageError, RecordingError
 from robots.common.writing import PARTIAL, written_whole
 from simulation.rendering.pictures import Cameras, vulkan_problem
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.engine.columns import overview
 from tasks.episode import Episode, play
 
@@ -39,7 +39,7 @@ def package_problem() -> str | None:
 
 
 def film(
-    task: MultiRobotTask,
+    task: TaskEnv,
     episodes: Sequence[Episode],
     path: Path,
     *,
@@ -80,7 +80,7 @@ def film(
 
 
 def play_pictured(
-    task: MultiRobotTask, episode: Episode, take: Callable[[int, Picture], None], stride: int = 1
+    task: TaskEnv, episode: Episode, take: Callable[[int, Picture], None], stride: int = 1
 ) -> None:
     """Play an episode, and take a picture after the reset and after every few steps.
 

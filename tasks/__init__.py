@@ -14,6 +14,7 @@ Making an environment of it for other programs (each loads its package when it i
 
 Writing a task (functions of arrays are in `tasks.maths`):
     MultiRobotTask: What a task's class subclasses.
+    TaskEnv: What `make` returns: environments that step a task.
     register_task: Gives it its names.
     Needs: What a place needs of the robot that stands there.
     Cube, Goal, Table, Area, …: Bodies that it declares, and where they begin.
@@ -70,6 +71,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "LogUniform",
     "Mesh",
     "MultiRobotTask",
+    "TaskEnv",
     "Needs",
     "Normal",
     "Peg",

@@ -20,7 +20,7 @@ from robots import TaskError
 from simulation import Camera
 from simulation.scene.cameras import RobotCamera
 from tasks.engine.cameras import cameras_of
-from tasks.engine.task import MultiRobotTask
+from tasks.engine.env import MultiRobotTask, TaskEnv
 from tasks.registry import full_name, get_task_class, make, origin, other_names
 
 # Written by ``python -m parity compare --all --record``; in a checkout and in the wheel.
@@ -188,13 +188,13 @@ def instruction_of(cls: type[MultiRobotTask]) -> str:
     return cls.instruction or read_docstring(cls).summary
 
 
-def describe(env: MultiRobotTask) -> Iterator[RenderableType]:
+def describe(env: TaskEnv) -> Iterator[RenderableType]:
     """Yield everything there is to know about a task, as lines and tables to print.
 
     Args:
         env: The task, with flat observations.
     """
-    cls = type(env)
+    cls = env.task_class
     text = read_docstring(cls)
     yield f"{cls.task_id}: {text.summary}\n"
     rows = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
@@ -224,7 +224,7 @@ def _full_name(cls: type[MultiRobotTask]) -> list[str]:
     return [] if name == cls.task_id else [name]
 
 
-def observation_size(env: MultiRobotTask) -> int:
+def observation_size(env: TaskEnv) -> int:
     """Return how many numbers the flat observation of a task has."""
     return max((part.stop for part in env.observation_slices.values()), default=0)
 

@@ -11,7 +11,7 @@ from kinematics.rotations import Floats, inverse, multiply, rotate, rotation_of
 from layouts import Layout
 from robots import JointGroup
 from simulation import State
-from tasks.engine.task import MultiRobotTask
+from tasks.engine.env import TaskEnv
 
 _NEARLY = 1.0 + 1e-4  # of a normalised number that is just at its bound
 
@@ -65,7 +65,7 @@ class PositionDrive:
     Its targets are positions of these joints (rad, m), (n,).
     """
 
-    def __init__(self, driven: DrivenGroup, task: MultiRobotTask) -> None:
+    def __init__(self, driven: DrivenGroup, task: TaskEnv) -> None:
         """Take the group of a task with one environment."""
         self.driven, self._task = driven, task
 
@@ -121,7 +121,7 @@ class TcpDrive:
     Its targets are poses of the TCP in the world: position (m), then quaternion (wxyz), (7,).
     """
 
-    def __init__(self, driven: DrivenGroup, task: MultiRobotTask) -> None:
+    def __init__(self, driven: DrivenGroup, task: TaskEnv) -> None:
         """Take the group of a task with one environment."""
         assert driven.arm is not None
         self.driven, self._task = driven, task
@@ -181,7 +181,7 @@ class TcpDrive:
 Drive = PositionDrive | VelocityDrive | TcpDrive
 
 
-def drive_of(driven: DrivenGroup, task: MultiRobotTask) -> Drive:
+def drive_of(driven: DrivenGroup, task: TaskEnv) -> Drive:
     """Return the drive of a group of a task with one environment."""
     asks = driven.group.asks
     if asks.tcp:
@@ -204,7 +204,7 @@ def _normalised(group: JointGroup, values: Floats) -> tuple[Floats, bool]:
     return np.clip(numbers, -1, 1), fits and bool((abs(numbers) <= _NEARLY).all())
 
 
-def _remembered(task: MultiRobotTask, driven: DrivenGroup, kind: str) -> Floats:
+def _remembered(task: TaskEnv, driven: DrivenGroup, kind: str) -> Floats:
     """Return what a group was last asked for; see `simulation.control.modes.Remembered`."""
     modes = task.simulation.modes
     assert modes is not None

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robots import TaskError
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 States = dict[str, dict[str, NDArray[np.float32]]]
 
 Policy = Callable[[Any], Any]
-"""``policy(obs)`` returns an action; both as `MultiRobotTask.step` has them, of 1 environment."""
+"""``policy(obs)`` returns an action; both as `TaskEnv.step` has them, of 1 environment."""
 
 REBUILT: dict[str, Any] = {"reconfigure": True}  # reset option: nothing of the past stays in PhysX
 
@@ -57,7 +57,7 @@ class PlayedEpisode(Episode):
     """An episode and what happened in it.
 
     Attributes:
-        states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k), the first
+        states: State dict of `TaskEnv.get_state_dict`, each entry (T + 1, k), the first
             row being the state after the reset, which rebuilt the world.
         rewards: Shape (T,).
         success: Shape (T,).
@@ -149,7 +149,7 @@ class Moment(NamedTuple):
 
 
 def moments(
-    task: MultiRobotTask,
+    task: TaskEnv,
     seed: int,
     policy: Policy,
     most: int,
@@ -164,7 +164,7 @@ def moments(
         policy: Who acts; see `open_loop` for actions that are known.
         most: Steps after which this ends; the caller may end it before.
         start: State to begin from instead of the one after the reset; see
-            `MultiRobotTask.set_state_dict`, which is not exact.
+            `TaskEnv.set_state_dict`, which is not exact.
 
     Yields:
         What the reset returned, then what each step did.
@@ -185,7 +185,7 @@ def moments(
         yield moment
 
 
-def take_step(task: MultiRobotTask, action: Any) -> Moment:
+def take_step(task: TaskEnv, action: Any) -> Moment:
     """Take a control step in a task with one environment, and return what it returned.
 
     Raises:
@@ -208,7 +208,7 @@ def open_loop(actions: Iterable[Any]) -> Policy:
 class EpisodeTape:
     """Keeps everything that happens in an episode of a task with one environment."""
 
-    def __init__(self, task: MultiRobotTask, seed: int) -> None:
+    def __init__(self, task: TaskEnv, seed: int) -> None:
         """Begin with the present state, that after the reset with a seed."""
         self._task, self._seed, self._states = task, seed, task.begin_tape()
         self._actions: list[NDArray[np.float32]] = []
@@ -238,7 +238,7 @@ class EpisodeTape:
 
 
 def play(
-    task: MultiRobotTask,
+    task: TaskEnv,
     seed: int,
     actions: NDArray[np.float32],
     watch: Callable[[], None] = lambda: None,

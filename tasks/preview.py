@@ -15,7 +15,7 @@ from robots.common.writing import written_whole
 from simulation.rendering.pictures import FIELD_OF_VIEW
 from simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from tasks.engine.cameras import cameras_of, resized
-from tasks.engine.task import MultiRobotTask
+from tasks.engine.env import TaskEnv
 
 SUPPORTED = (".png", ".jpg", ".webp")
 ACROSS = 4  # pictures
@@ -28,7 +28,7 @@ Picture = NDArray[np.uint8]
 
 
 def draws(
-    task: MultiRobotTask,
+    task: TaskEnv,
     count: int = 12,
     *,
     seed: int = 0,
@@ -102,16 +102,16 @@ def expect_format(path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _camera(task: MultiRobotTask, name: str | None) -> AnyCamera:
+def _camera(task: TaskEnv, name: str | None) -> AnyCamera:
     """Return the camera that a name means; see `draws`."""
     cameras = cameras_of(task.layout, task.scenario.cameras or task.cameras)
     known = {camera_name(camera): camera for camera in cameras.values()}
     if name is not None and name not in known:
-        raise UnknownNameError(f"camera of {type(task).__name__}", name, known)
+        raise UnknownNameError(f"camera of {task.task_class.__name__}", name, known)
     varied = (task.drawn() or {}).get("cameras", ())
     chosen = next((n for n in known if n in varied), None) if name is None else name
     if chosen is None:
-        return Camera(*task.viewpoint, "preview", _HEIGHT, _HEIGHT, FIELD_OF_VIEW)
+        return Camera(*task.task.viewpoint, "preview", _HEIGHT, _HEIGHT, FIELD_OF_VIEW)
     return _enlarged(known[chosen])
 
 

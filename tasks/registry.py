@@ -18,9 +18,9 @@ from robots.common.catalogue import Catalogue, reason
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from tasks.engine.env import MultiRobotTask, TaskEnv
     from tasks.engine.making import ScenarioFields
     from tasks.engine.scenario import Scenario
-    from tasks.engine.task import MultiRobotTask
 
 CLONES = "tasks.maniskill."  # where the tasks that clone one of ManiSkill's are
 
@@ -60,7 +60,7 @@ def _native_name(name: str) -> str:
 
 def _check(given: object, origin: str, name: str) -> type[MultiRobotTask]:
     """Return what an entry point gave, if it is a task's class of the name that it goes by."""
-    from tasks.engine.task import MultiRobotTask
+    from tasks.engine.env import MultiRobotTask
 
     if not (isinstance(given, type) and issubclass(given, MultiRobotTask) and given.task_id):
         raise TaskError(
@@ -106,7 +106,7 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
 
     def register(cls: TaskClass) -> TaskClass:
         from tasks.engine.declared import check_declaration  # it loads torch, as the class has
-        from tasks.engine.task import MultiRobotTask
+        from tasks.engine.env import MultiRobotTask
 
         if not (isinstance(cls, type) and issubclass(cls, MultiRobotTask)):
             raise TaskError(
@@ -206,7 +206,7 @@ def make(
     obs_mode: str = "state",
     reward_mode: str | None = None,
     **fields: Unpack[ScenarioFields],
-) -> MultiRobotTask:
+) -> TaskEnv:
     """Make a task.
 
     Args:

@@ -13,14 +13,14 @@ from layouts.viewer import Cell, Motion, Thing
 from layouts.visuals import Part, coloured, load_meshes
 from robots import TaskError
 from simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
-from tasks.engine.task import MultiRobotTask
+from tasks.engine.env import TaskEnv
 from tasks.native.format import articulation_keys, declared_joints
 
 PLANE_SIZE = 6.0  # m, of what is drawn of an infinite plane
 ROOT = 13  # numbers of a row before the joints: the root's pose and velocities
 
 
-def task_cell(task: MultiRobotTask, title: str, motion: Motion | None = None) -> Cell:
+def task_cell(task: TaskEnv, title: str, motion: Motion | None = None) -> Cell:
     """Return what a page shows of a task as it stands now, in its first environment.
 
     Args:
@@ -39,7 +39,7 @@ def task_cell(task: MultiRobotTask, title: str, motion: Motion | None = None) ->
     return Cell(title, task.standing(), things, motion, start)
 
 
-def live_thing(task: MultiRobotTask, name: str) -> Thing | None:
+def live_thing(task: TaskEnv, name: str) -> Thing | None:
     """Return what a page shows of a body as it is now, or None if that is not drawn.
 
     Args:
@@ -51,14 +51,12 @@ def live_thing(task: MultiRobotTask, name: str) -> Thing | None:
     return Thing(parts, pose) if parts else None
 
 
-def recorded_motion(
-    task: MultiRobotTask, states: Mapping[str, Mapping[str, NDArray[Any]]]
-) -> Motion:
+def recorded_motion(task: TaskEnv, states: Mapping[str, Mapping[str, NDArray[Any]]]) -> Motion:
     """Return the motion that recorded states describe.
 
     Args:
         task: The task they are of, with one environment.
-        states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k).
+        states: State dict of `TaskEnv.get_state_dict`, each entry (T + 1, k).
 
     Raises:
         TaskError: If a robot is not in them, or an entry is of something else.

@@ -21,9 +21,9 @@ from simulation import (
 )
 from simulation.scene.shapes import POLISHED, Color, Finish, linear
 from simulation.state import once_per_state
-from tasks.engine.declaration import Info
+from tasks.engine.env import MultiRobotTask, TaskEnv
 from tasks.engine.scenario import Scenario
-from tasks.engine.task import MultiRobotTask
+from tasks.engine.task import Info
 from tasks.language.bodies import (
     Area,
     Ball,
@@ -90,6 +90,7 @@ __all__ = [
     "LogUniform",
     "Mesh",
     "MultiRobotTask",
+    "TaskEnv",
     "Needs",
     "Normal",
     "POLISHED",

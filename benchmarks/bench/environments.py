@@ -23,11 +23,11 @@ from tasks import (
     CameraShift,
     Distractors,
     Light,
-    MultiRobotTask,
     Normal,
     Randomization,
     Shift,
     Surface,
+    TaskEnv,
     Texture,
     Uniform,
     Whole,
@@ -76,7 +76,7 @@ LOOKS = {
 class Played:
     """A task whose step is timed under random actions, and the physics of the same motion."""
 
-    def __init__(self, env: MultiRobotTask, settings: Settings) -> None:
+    def __init__(self, env: TaskEnv, settings: Settings) -> None:
         """Take a task; its first action is played now, as building leaves work to it."""
         self.env, self._settings = env, settings
         env.step(torch.from_numpy(self.actions(0)[0]))
@@ -139,7 +139,7 @@ def robots(settings: Settings) -> Measurement:
 
 def contacts(settings: Settings) -> Measurement:
     """A step by number of bodies that touch."""
-    envs: dict[int, MultiRobotTask] = {}
+    envs: dict[int, TaskEnv] = {}
     for cubes in settings.cubes:
         env = make_pile(cubes)
         Played(env, settings)  # its first action lets the cubes touch
@@ -218,7 +218,7 @@ def looks(settings: Settings) -> Measurement:
 def step_beside_native(settings: Settings) -> Measurement:
     """A step of one environment of each clone, native's and ours."""
 
-    def variants(native: Any, ours: MultiRobotTask) -> dict[str, Sample]:
+    def variants(native: Any, ours: TaskEnv) -> dict[str, Sample]:
         played = Played(ours, settings)
 
         def native_steps(number: int) -> float:
@@ -240,7 +240,7 @@ def step_beside_native(settings: Settings) -> Measurement:
 def reset_beside_native(settings: Settings) -> Measurement:
     """A reset of one environment of each clone, native's and ours."""
 
-    def variants(native: Any, ours: MultiRobotTask) -> dict[str, Sample]:
+    def variants(native: Any, ours: TaskEnv) -> dict[str, Sample]:
         return {
             HERE: _timed_resets(settings, ours.reset),
             NATIVE: _timed_resets(settings, lambda seed: native.reset(seed=seed)),
@@ -252,7 +252,7 @@ def reset_beside_native(settings: Settings) -> Measurement:
 
 
 def _beside_native(
-    settings: Settings, variants: Callable[[Any, MultiRobotTask], dict[str, Sample]]
+    settings: Settings, variants: Callable[[Any, TaskEnv], dict[str, Sample]]
 ) -> dict[tuple[str, str], list[float]]:
     """Take samples of one clone after the other, with native's environment and ours."""
     samples: dict[tuple[str, str], list[float]] = {}
@@ -273,7 +273,7 @@ def _beside_physics(
     name: str,
     title: str,
     variable: str,
-    envs: Mapping[str, Mapping[SomeValue, MultiRobotTask]],
+    envs: Mapping[str, Mapping[SomeValue, TaskEnv]],
 ) -> Measurement:
     """Time steps and physics; one series is beside `PHYSICS`, several are each beside its own."""
     floors = {series: PHYSICS if len(envs) == 1 else f"{series}, physics" for series in envs}
@@ -287,7 +287,7 @@ def _beside_physics(
     return measured(name, title, "µs per step", variable, samples, tuple(floors.values()), ratios)
 
 
-def _rebuild(env: MultiRobotTask) -> Callable[[int], object]:
+def _rebuild(env: TaskEnv) -> Callable[[int], object]:
     return lambda seed: env.reset(seed, options=REBUILT)
 
 
@@ -314,16 +314,16 @@ def _timed_resets(settings: Settings, reset_to: Callable[[int], object]) -> Samp
     return sample
 
 
-def _timed_steps(settings: Settings, env: MultiRobotTask) -> Sample:
+def _timed_steps(settings: Settings, env: TaskEnv) -> Sample:
     """Return what times a step (ms)."""
     played = Played(env, settings)
     return lambda number: played.step(number) / 1e3
 
 
 def _timed_episodes(
-    env: MultiRobotTask,
+    env: TaskEnv,
     settings: Settings,
-    play_all: Callable[[MultiRobotTask, Sequence[NDArray[np.float32]]], None],
+    play_all: Callable[[TaskEnv, Sequence[NDArray[np.float32]]], None],
 ) -> Sample:
     """Return what times an episode (ms)."""
 
@@ -338,14 +338,14 @@ def _timed_episodes(
     return sample
 
 
-def _step_all(env: MultiRobotTask, episodes: Iterable[NDArray[np.float32]]) -> None:
+def _step_all(env: TaskEnv, episodes: Iterable[NDArray[np.float32]]) -> None:
     for seed, actions in enumerate(episodes):
         env.reset(seed, options=REBUILT)
         for action in actions:
             env.step(torch.from_numpy(action))
 
 
-def _record_all(env: MultiRobotTask, episodes: Iterable[NDArray[np.float32]]) -> None:
+def _record_all(env: TaskEnv, episodes: Iterable[NDArray[np.float32]]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         with Recorder(Path(folder) / "trajectory.h5", env) as recorder:
             for seed, actions in enumerate(episodes):

@@ -11,7 +11,7 @@ import numpy as np
 from layouts import Layout, ring, single
 from simulation import PhysicsSettings, State, World, add_table
 from simulation.maths import Array
-from tasks import EpisodeRandom, MultiRobotTask
+from tasks import EpisodeRandom, MultiRobotTask, TaskEnv
 from tasks.engine.task import Info
 from tasks.language.props import BLUE, add_cube, add_wide_table
 
@@ -95,16 +95,16 @@ def crowd(count: int, kinds: Sequence[str]) -> Layout:
     return ring(robots, radius=RADIUS)
 
 
-def make_crowd(count: int, kinds: Sequence[str]) -> Crowd:
+def make_crowd(count: int, kinds: Sequence[str]) -> TaskEnv:
     """Make a ring of robots; it is not checked for collisions."""
     scenario = Crowd.scenario
     scenario.layout, scenario.check_layout = crowd(count, kinds), False
     return Crowd(scenario)
 
 
-def make_pile(cubes: int) -> Pile:
+def make_pile(cubes: int) -> TaskEnv:
     """Make a pile of ``cubes`` cubes."""
-    cls = type("Pile", (Pile,), {"cubes": cubes, "__doc__": Pile.__doc__})
+    cls: type[Pile] = type("Pile", (Pile,), {"cubes": cubes, "__doc__": Pile.__doc__})
     return cls(cls.scenario)
 
 

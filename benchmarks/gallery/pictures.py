@@ -32,7 +32,7 @@ from simulation.checks.overlaps import empty, stand
 from simulation.rendering.pictures import vulkan_problem
 from simulation.scene.cameras import View
 from simulation.simulation import Simulation
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.engine.columns import overview
 from tasks.episode import play
 
@@ -193,7 +193,7 @@ def portrait(robot: RobotDescriptor) -> tuple[Simulation, Picture]:
     return simulation, shrunk(drawn.astype(np.uint8), solid, PORTRAIT_SAMPLES)
 
 
-def film(task_id: str, seed: int) -> tuple[MultiRobotTask, list[Picture]]:
+def film(task_id: str, seed: int) -> tuple[TaskEnv, list[Picture]]:
     """Film an expert's episode, from the reset to its end.
 
     It is played once without a camera, to see what must be in the picture.
@@ -335,7 +335,7 @@ def _centred(across: Floats, depth: Floats, slope: float) -> tuple[float, float]
     return float((low + high) / 2), float((high - low) / (2 * slope))
 
 
-def _places(task: MultiRobotTask) -> Floats:
+def _places(task: TaskEnv) -> Floats:
     """Return where all links and bodies are that may move, (P, 3) (m, world)."""
     state, simulation = task.simulation.read(), task.simulation
     places = [

@@ -12,7 +12,7 @@ from experts.geometry import gripper_facing, turn, yaw_of
 from experts.rehearsal import first_success
 from experts.script import Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, rotate
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.draw_triangle import CANVAS_TOP, SIDE
 
 ARM, TRIANGLE = "arm", "goal_tri"
@@ -23,7 +23,7 @@ NEAR = 0.02  # rad; 2 cm at the stick's tip at the very most, within what a dot 
 TURNS = np.radians(range(0, 360, 45))  # of the stick about itself; the quickest is taken
 
 
-def draw_outline(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def draw_outline(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that draw the outline, (T, A).
 
     Args:

@@ -14,7 +14,7 @@ from experts.grasps import need_fingers
 from experts.rehearsal import first_success
 from experts.script import OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, rotate
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.lift_peg_upright import PEG_HALF_LENGTH
 
 ARM, PEG = "arm", "peg"
@@ -52,7 +52,7 @@ STYLES = (
 )
 
 
-def stand_up(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def stand_up(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that stand the peg up, (T, A).
 
     Args:

@@ -17,7 +17,7 @@ from experts.grasps import bringing, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, rotate
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.peg_insertion_side import INSERTED, PegDesign
 
 ARM, PEG, BOX = "arm", "peg", "box_with_hole"
@@ -55,7 +55,7 @@ STYLES = (
 )
 
 
-def insert_peg(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def insert_peg(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that insert the peg, (T, A).
 
     Args:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from experts.grasps import cube_grips, held_at, need_fingers, pick
 from experts.rehearsal import first_success
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 ARM, CUBE, GOAL = "arm", "cube", "goal_site"
 
@@ -42,7 +42,7 @@ STYLES = (
 )
 
 
-def pick_cube(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def pick_cube(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that bring the cube to the goal, (T, A).
 
     Args:

@@ -21,7 +21,7 @@ from experts.script import Scene, Script, Waypoint
 from kinematics.rotations import Floats
 from robots import TaskError
 from simulation.backend import PointSolver
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.pick_cube_so100 import PickCubeSO100
 
 ARM, CUBE, GOAL = "arm", "cube", "goal_site"
@@ -91,7 +91,7 @@ STYLES = (
 )
 
 
-def pick_small_cube(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def pick_small_cube(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that bring the cube to the goal, (T, A).
 
     Args:

@@ -14,7 +14,7 @@ from experts.geometry import gripper_facing
 from experts.grasps import held_at, is_near, need_fingers, pick
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.place_sphere import RADIUS, WALL
 
 ARM, BALL, BIN = "arm", "sphere", "bin"
@@ -47,7 +47,7 @@ YAWS = (0.0, -0.3, 0.3, -0.6, 0.6)
 STYLES = (Style(), Style(drop=0.003), Style(grip=0.01), Style(grip=0.0), Style(drop=0.001))
 
 
-def place_sphere(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def place_sphere(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that put the ball into the bin, (T, A).
 
     Args:

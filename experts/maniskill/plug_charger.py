@@ -14,7 +14,7 @@ from experts.grasps import bringing, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, multiply, rotate
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.plug_charger import PRONG_HALF_SIZE
 
 ARM, CHARGER, RECEPTACLE = "arm", "charger", "receptacle"
@@ -49,7 +49,7 @@ STYLES = (
 )
 
 
-def plug_in(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def plug_in(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that plug the charger in, (T, A).
 
     Args:

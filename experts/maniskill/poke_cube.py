@@ -14,7 +14,7 @@ from experts.grasps import holding, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, multiply
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.poke_cube import CUBE_HALF_SIZE, PEG_HALF_LENGTH, PEG_HALF_WIDTH
 
 ARM, CUBE, PEG, TARGET = "arm", "cube", "peg", "goal_region"
@@ -49,7 +49,7 @@ STYLES = (
 )
 
 
-def poke(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def poke(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that poke the cube onto its target, (T, A).
 
     Args:

@@ -15,7 +15,7 @@ from experts.grasps import holding, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, multiply, rotate
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.pull_cube_tool import (
     CUBE_HALF_SIZE,
     HANDLE_LENGTH,
@@ -61,7 +61,7 @@ STYLES = (
 )
 
 
-def pull(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def pull(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that pull the cube near, (T, A).
 
     Args:

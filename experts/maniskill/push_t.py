@@ -15,7 +15,7 @@ from experts.maniskill.sliding import SlidingBody, to_body
 from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import OPEN, Scene
 from kinematics.rotations import Floats
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.push_t import BAR_HALF_SIZE, CENTRE_OF_MASS_Y, STEM_HALF_SIZE
 
 ARM, TEE, OUTLINE = "arm", "Tee", "goal_Tee"
@@ -34,7 +34,7 @@ PATIENCE = 6  # control steps for each waypoint along a push
 FEW = 5  # plans in a row that may come to nothing
 
 
-def push_onto_outline(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def push_onto_outline(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that push the T onto its outline, (T, A).
 
     Args:

@@ -15,7 +15,7 @@ from experts.rehearsal import Attempt, Rehearsal, search
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, multiply
 from simulation.backend import PoseSolver
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 ARM, BALL, TARGET = "arm", "ball", "goal_region"
 
@@ -55,7 +55,7 @@ STYLES = (
 )
 
 
-def roll(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def roll(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that roll the ball onto its target, (T, A).
 
     Args:

@@ -13,7 +13,7 @@ from experts.geometry import gripper_facing, heading
 from experts.rehearsal import first_success
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 ARM, CUBE, TARGET = "arm", "cube", "goal_region"
 
@@ -41,7 +41,7 @@ class Style:
 STYLES = (Style(), Style(gap=0.06), Style(height=0.03), Style(gap=0.06, legs=6))
 
 
-def slide(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def slide(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that slide the cube onto its target, (T, A).
 
     The gripper comes down on the cube's far side, seen from the target: before it where it is to

@@ -21,7 +21,7 @@ from experts.grasps import (
 )
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.stack_cube import CUBE_HALF_SIZE
 
 ARM, TOP, BASE = "arm", "cubeA", "cubeB"
@@ -61,7 +61,7 @@ STYLES = (
 )
 
 
-def stack_cube(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def stack_cube(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that stack the red cube on the green one, (T, A).
 
     Args:

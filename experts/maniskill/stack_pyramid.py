@@ -25,7 +25,7 @@ from experts.grasps import (
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.stack_pyramid import CUBE_HALF_SIZE
 
 ARM, RED, GREEN, BLUE = "arm", "cubeA", "cubeB", "cubeC"
@@ -67,7 +67,7 @@ STYLES = (
 )
 
 
-def stack_pyramid(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def stack_pyramid(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions that build the pyramid, (T, A).
 
     Args:

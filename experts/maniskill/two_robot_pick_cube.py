@@ -14,7 +14,7 @@ from experts.grasps import QUARTERS, holding, need_fingers
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats, multiply
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 GIVER, TAKER, CUBE, GOAL = "left", "right", "cube", "goal_site"
 
@@ -79,7 +79,7 @@ STYLES = (
 )
 
 
-def hand_over(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def hand_over(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions of the hand-over, (T, A).
 
     Args:

@@ -26,7 +26,7 @@ from experts.grasps import (
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 from kinematics.rotations import Floats, multiply, rotate
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.maniskill.two_robot_stack_cube import CUBE_HALF_SIZE
 
 STACKER, LAYER, TOP, BASE, TARGET = "left", "right", "cubeA", "cubeB", "goal_region"
@@ -82,7 +82,7 @@ STYLES = (
 )
 
 
-def stack_for_two(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def stack_for_two(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions of both arms, (T, A).
 
     Args:
@@ -103,7 +103,7 @@ def stack_for_two(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     )
 
 
-def _lay(task: MultiRobotTask, style: Style, first: Scene) -> tuple[Waypoint, ...]:
+def _lay(task: TaskEnv, style: Style, first: Scene) -> tuple[Waypoint, ...]:
     """The right arm brings the green cube and makes room."""
     base, other = first.base(LAYER), first.base(STACKER)
     at_target = partial(_at_target, style=style, base=base)
@@ -141,7 +141,7 @@ def _lay(task: MultiRobotTask, style: Style, first: Scene) -> tuple[Waypoint, ..
     )
 
 
-def _stack(task: MultiRobotTask, style: Style, first: Scene) -> tuple[Waypoint, ...]:
+def _stack(task: TaskEnv, style: Style, first: Scene) -> tuple[Waypoint, ...]:
     """The left arm picks the blue cube, waits, and lays it on the green one."""
     base, other = first.base(STACKER), first.base(LAYER)
 

@@ -25,7 +25,7 @@ from experts.grasps import (
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.originals.four_robot_stack import CUBE_HALF_SIZE, ORDER
 
 IN_PLACE = 0.012  # how near to its place a cube is let go (m)
@@ -71,7 +71,7 @@ STYLES = (
 )
 
 
-def stack_for_four(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def stack_for_four(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions of all arms, (T, A).
 
     Args:
@@ -96,7 +96,7 @@ def stack_for_four(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
 
 
 def _stack(
-    task: MultiRobotTask, style: Style, robot: str, base: Floats, start: Floats
+    task: TaskEnv, style: Style, robot: str, base: Floats, start: Floats
 ) -> tuple[Waypoint, ...]:
     """One arm picks its cube, waits for the one before it, and lays its own on top.
 

@@ -14,7 +14,7 @@ from experts.reaching import reaching
 from experts.rehearsal import first_success
 from experts.script import CLOSED, Scene, Script, Waypoint
 from kinematics.rotations import Floats
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.originals.relay import find_zones
 
 BATON = "baton"
@@ -50,7 +50,7 @@ STYLES = (
 )
 
 
-def pass_on(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def pass_on(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions of all robots, (T, A).
 
     Args:
@@ -65,7 +65,7 @@ def pass_on(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
     )
 
 
-def _script(style: Style, task: MultiRobotTask, scene: Scene) -> Script:
+def _script(style: Style, task: TaskEnv, scene: Scene) -> Script:
     zones = [np.array([*zone, 0.0]) for zone in find_zones(task.layout)]
     names = list(task.layout.arms)
     script: dict[str, tuple[Waypoint, ...]] = {}
@@ -81,7 +81,7 @@ class _Part:
     def __init__(
         self,
         style: Style,
-        task: MultiRobotTask,
+        task: TaskEnv,
         robot: str,
         base: Floats,
         start: Floats,

@@ -14,7 +14,7 @@ from experts.grasps import bringing, need_fingers, pick
 from experts.rehearsal import first_success
 from experts.script import CLOSED, Pose, Scene, Script, Waypoint
 from kinematics.rotations import rotate
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.originals.two_robot_lift_bar import GRIP, HALF_THICKNESS, HEIGHT
 
 BAR = "bar"
@@ -46,7 +46,7 @@ STYLES = (
 )
 
 
-def lift_for_two(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def lift_for_two(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions of both arms, (T, A).
 
     Args:

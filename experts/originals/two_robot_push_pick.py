@@ -14,7 +14,7 @@ from experts.grasps import cube_grips, held_at, need_fingers, pick
 from experts.rehearsal import first_success
 from experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
 from kinematics.rotations import Floats
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 PUSHER, PICKER, CUBE, GOAL = "pusher", "picker", "cube", "goal_site"
 
@@ -51,7 +51,7 @@ STYLES = (
 )
 
 
-def push_and_pick(task: MultiRobotTask, seed: int) -> NDArray[np.float32]:
+def push_and_pick(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     """Return the actions of both arms, (T, A).
 
     Args:

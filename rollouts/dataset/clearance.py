@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from layouts import Layout, Placement
 from rollouts.export.columns import ColumnReader
 from rollouts.reading.recording import Recording
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.native.format import articulation_keys
 
 
@@ -35,7 +35,7 @@ class Clearances:
 
 def measure(
     file: Recording,
-    task: MultiRobotTask,
+    task: TaskEnv,
     places: Sequence[int],
     progress: Callable[[], None] = lambda: None,
 ) -> Clearances | None:

@@ -13,7 +13,7 @@ import numpy as np
 from rollouts.dataset.contents import Contents
 from rollouts.reading.recording import Recording, Trajectory
 from rollouts.video import Picture, open_video, play_pictured
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.episode import Episode
 
 STRIDE = 2  # control steps from one picture to the next
@@ -58,7 +58,7 @@ def chosen_places(contents: Contents, most: int) -> dict[int, str]:
 
 def film(
     file: Recording,
-    task: MultiRobotTask,
+    task: TaskEnv,
     places: dict[int, str],
     progress: Callable[[], None] = lambda: None,
 ) -> list[Clip]:
@@ -83,7 +83,7 @@ def film(
     return clips
 
 
-def _film_one(task: MultiRobotTask, trajectory: Trajectory) -> tuple[bytes, bytes]:
+def _film_one(task: TaskEnv, trajectory: Trajectory) -> tuple[bytes, bytes]:
     """Return an mp4 file's bytes, and those of a jpeg of the last picture."""
     import imageio.v2 as imageio
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robots import RobotDescriptor
 from rollouts.reading.recording import Recording, Trajectory, TrajectoryError
 from rollouts.sources.actors import EXPERT
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.engine.columns import placed_bodies
 from tasks.episode import States
 from tasks.native.format import articulation_keys, declared_joints
@@ -108,7 +108,7 @@ class ColumnReader:
         body_names: ``body.x`` to ``body.qz`` of each body.
     """
 
-    def __init__(self, task: MultiRobotTask, credits: Credits | None = None) -> None:
+    def __init__(self, task: TaskEnv, credits: Credits | None = None) -> None:
         """Take the names from a task and its robots.
 
         Args:

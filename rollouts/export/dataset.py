@@ -128,7 +128,7 @@ class _Work:
 
             self._shots = choose_shots(task, names, size=wanted.size, depth=wanted.depth)
         self.seen = bool(self._shots and self._shots.cameras)
-        self._instruction = instruction_of(type(task))
+        self._instruction = instruction_of(task.task_class)
 
     def text(self, trajectory: Trajectory) -> str | None:
         """Return what is to be done in an episode; None if nobody says so or asks.
@@ -184,7 +184,7 @@ class _Work:
         from rollouts.export.drawing_job import DrawingJob, draw_in_order
 
         path = Path(wanted.recording).absolute()
-        job = DrawingJob(path, type(task), shots, last, wanted.layout, wanted.robots)
+        job = DrawingJob(path, task.task_class, shots, last, wanted.layout, wanted.robots)
         numbers = [i for i in range(len(file)) if wanted.include_failures or succeeded(file[i])]
         episodes = draw_in_order(
             job, executor, numbers, folder, lambda n: progress(n, len(file)), tell

@@ -14,7 +14,7 @@ from rollouts.reading.recording import TrajectoryError
 from rollouts.video import INSTALL
 from simulation import Simulation
 from simulation.rendering.pictures import SIZE, Cameras, Observers, vulkan_problem
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.engine.columns import OVERVIEW
 from tasks.episode import States, moments, open_loop
 
@@ -55,7 +55,7 @@ class Drawing:
     """
 
     def __init__(
-        self, task: MultiRobotTask, columns: Columns, shots: Shots, *, last: bool = False
+        self, task: TaskEnv, columns: Columns, shots: Shots, *, last: bool = False
     ) -> None:
         """Prepare to draw.
 
@@ -95,7 +95,7 @@ class Drawing:
             next(happening, None)
 
 
-def _is_in_state(task: MultiRobotTask, states: States, t: int) -> bool:
+def _is_in_state(task: TaskEnv, states: States, t: int) -> bool:
     current = task.get_state_dict()
     return all(
         np.array_equal(current[kind][name].numpy(), row)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robots import TaskError, UnknownNameError
 from simulation.rendering.pictures import SIZE
 from simulation.scene.cameras import AnyCamera, RobotCamera
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.engine.cameras import Size, by_place, cameras_of, expect_apart, resized
 from tasks.engine.columns import OVERVIEW, Viewpoint, overview
 
@@ -85,7 +85,7 @@ class Shots:
 
 
 def choose_shots(
-    task: MultiRobotTask,
+    task: TaskEnv,
     names: Sequence[str],
     *,
     size: Size | None = None,

@@ -14,7 +14,7 @@ from rollouts.playing.randomness import random_states, seed_all
 from rollouts.playing.together import Player, is_batched
 from rollouts.sources.actors import is_person
 from rollouts.sources.policies import EXPERT, check_policy, find_policy
-from tasks import MultiRobotTask
+from tasks import MultiRobotTask, TaskEnv
 from tasks.episode import PlayedEpisode, Policy, open_loop
 
 
@@ -61,7 +61,7 @@ def cast_of(policy: Policy | str, task: type[MultiRobotTask]) -> tuple[Cast, str
 class Casting:
     """Makes the players of the episodes of one task."""
 
-    def __init__(self, cast: Cast, env: MultiRobotTask) -> None:
+    def __init__(self, cast: Cast, env: TaskEnv) -> None:
         """Prepare for plans if an expert plays.
 
         Args:
@@ -69,11 +69,11 @@ class Casting:
             env: Where it is played; experts that plan leave it alone.
         """
         self._cast, self._env = cast, env
-        self._own: MultiRobotTask | None = None
+        self._own: TaskEnv | None = None
         self._planner: Planner | None = None
         if cast.expert is not None:
             if env.num_envs > 1:
-                self._own = type(env)(replace(env.scenario, num_envs=1))
+                self._own = env.task_class(replace(env.scenario, num_envs=1))
             self._planner = Planner(self._own or env, cast.expert)
 
     def __call__(self, seed: int) -> Player:

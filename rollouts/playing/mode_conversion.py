@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from kinematics.rotations import Floats, inverse, multiply
 from robots import JointGroup
 from simulation import State
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.driving import DrivenGroup, TcpDrive, VelocityDrive, drive_of, driven_groups
 from tasks.episode import REBUILT, moments, open_loop
 
@@ -106,7 +106,7 @@ class Attempt(NamedTuple):
 
 
 def converted_steps(
-    source: MultiRobotTask, seed: int, actions: NDArray[np.float32], task: MultiRobotTask
+    source: TaskEnv, seed: int, actions: NDArray[np.float32], task: TaskEnv
 ) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
     """Return actions for a task that move its robots as some moved those of another.
 
@@ -146,9 +146,7 @@ def _arrays(found: Attempt) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
     return np.array(found.actions, np.float32), np.array(found.steps, np.intp)
 
 
-def why_lost(
-    source: MultiRobotTask, seed: int, actions: NDArray[np.float32], task: MultiRobotTask
-) -> str:
+def why_lost(source: TaskEnv, seed: int, actions: NDArray[np.float32], task: TaskEnv) -> str:
     """Return why `converted_steps` does not solve an episode; its arguments are the same."""
     recorded = followed(source, seed, actions)
     if not recorded.solved:
@@ -167,7 +165,7 @@ def turned(states: Sequence[State], arm: str) -> float:
     return float(np.degrees(2 * np.arccos(np.clip(part, 0, 1))).max())
 
 
-def _lost_turns(recorded: Recorded, task: MultiRobotTask) -> dict[str, float]:
+def _lost_turns(recorded: Recorded, task: TaskEnv) -> dict[str, float]:
     """Return how far TCPs turn whose mode says where they go, and not how they turn (degrees)."""
     lost: dict[str, float] = {}
     for (robot, name), arm in task.layout.arms_by_group.items():
@@ -177,7 +175,7 @@ def _lost_turns(recorded: Recorded, task: MultiRobotTask) -> dict[str, float]:
     return lost
 
 
-def followed(task: MultiRobotTask, seed: int, actions: NDArray[np.float32]) -> Recorded:
+def followed(task: TaskEnv, seed: int, actions: NDArray[np.float32]) -> Recorded:
     """Play an episode and return what it drove joints to."""
     playing = moments(task, seed, open_loop(actions), len(actions))
     next(playing)
@@ -192,7 +190,7 @@ def followed(task: MultiRobotTask, seed: int, actions: NDArray[np.float32]) -> R
 
 def _attempt(
     references: Mapping[_Group, Reference],
-    task: MultiRobotTask,
+    task: TaskEnv,
     seed: int,
     steps: int,
     schedule: Schedule,
@@ -218,7 +216,7 @@ def _attempt(
 
 
 def _action(
-    references: Mapping[_Group, Reference], task: MultiRobotTask, step: int
+    references: Mapping[_Group, Reference], task: TaskEnv, step: int
 ) -> tuple[NDArray[np.float32], bool]:
     """Return the action of one step, (A,), and whether it drives all the way to the references."""
     state = task.simulation.read()
@@ -230,7 +228,7 @@ def _action(
     return action, enough
 
 
-def _groups(source: MultiRobotTask, task: MultiRobotTask) -> list[_Group]:
+def _groups(source: TaskEnv, task: TaskEnv) -> list[_Group]:
     """Return the joint groups of a task.
 
     Args:
@@ -271,7 +269,7 @@ class _Group:
     is the way that is left in the middle of the step, times stiffness / damping.
     """
 
-    def __init__(self, after: DrivenGroup, before: DrivenGroup, task: MultiRobotTask) -> None:
+    def __init__(self, after: DrivenGroup, before: DrivenGroup, task: TaskEnv) -> None:
         self.numbers, self._before, self._joints = after.numbers, before, after.joints
         self._drive = drive_of(after, task)
         self._by_speed = isinstance(self._drive, VelocityDrive)

@@ -11,7 +11,7 @@ from experts.registry import Expert
 from experts.rehearsal import rehearsed
 from robots import CONTROL_MODES, TaskError
 from rollouts.playing.mode_conversion import converted_steps, followed
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.driving import driven_groups
 from tasks.episode import PlayedEpisode
 
@@ -27,13 +27,13 @@ class Planner:
             `experts.rehearsal.rehearsed`.
     """
 
-    def __init__(self, task: MultiRobotTask, expert: Expert) -> None:
+    def __init__(self, task: TaskEnv, expert: Expert) -> None:
         """Make a task in deltas for the expert to plan for, if this one is in another mode."""
         self._task, self._expert, self._played, self.reason = task, expert, task, ""
         self.rehearsed: PlayedEpisode | None = None
         self._converts = task.control_mode != DELTAS
         if self._converts:
-            self._task = type(task)(replace(task.scenario, control_mode=DELTAS))
+            self._task = task.task_class(replace(task.scenario, control_mode=DELTAS))
 
     def __call__(self, seed: int) -> NDArray[np.float32]:
         """Return the actions (T, A) of the episode that ``seed`` begins.
@@ -56,9 +56,7 @@ class Planner:
             self._task.close()
 
 
-def as_positions(
-    task: MultiRobotTask, seed: int, actions: NDArray[np.float32]
-) -> NDArray[np.float32]:
+def as_positions(task: TaskEnv, seed: int, actions: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the actions in ``pd_joint_pos`` that move everything as these do, to the last bit.
 
     The episode is played once, and the drive targets of each step are kept.

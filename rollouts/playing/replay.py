@@ -12,7 +12,7 @@ from robots import TaskError
 from rollouts.playing.comparison import Difference, first_difference
 from rollouts.reading.recorded_task import task_class, task_for
 from rollouts.reading.recording import FILE, Recording, Trajectory, TrajectoryError
-from tasks import MultiRobotTask, get_task_class
+from tasks import TaskEnv, get_task_class
 from tasks.episode import play
 
 Start = Literal["seed", "state"]
@@ -116,7 +116,7 @@ def find_official(task_id: str) -> Path:
 
 
 def replay(
-    task: MultiRobotTask,
+    task: TaskEnv,
     trajectory: Trajectory,
     start: Start = "seed",
     *,

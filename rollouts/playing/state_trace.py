@@ -34,7 +34,7 @@ def trace_of(states: States) -> StateTrace:
     over the bytes of these entries after the reset and after each step.
 
     Args:
-        states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k).
+        states: State dict of `TaskEnv.get_state_dict`, each entry (T + 1, k).
     """
     entries = {
         f"{kind}/{name}": rows

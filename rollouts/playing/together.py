@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from robots import ActionError, TaskError
 from rollouts.playing.randomness import random_states, set_random_states
 from rollouts.playing.scheduler import Event
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.engine.actions import ActionReader
 from tasks.episode import REBUILT, Moment, PlayedEpisode, Policy, Score, States
 
@@ -128,25 +128,25 @@ def one_by_one(event: Event) -> list[Event]:
     return [replace(event, seed=seed, result=result) for seed, result in event.result.items()]
 
 
-def play_together(env: MultiRobotTask, players: Sequence[Player]) -> None:
+def play_together(env: TaskEnv, players: Sequence[Player]) -> None:
     """Play an episode for each player until all are over; see `steps_together`."""
     if acting := _acting(players):
         for _ in steps_together(env, acting):
             pass
 
 
-def states_together(env: MultiRobotTask, players: Sequence[Player]) -> list[States]:
+def states_together(env: TaskEnv, players: Sequence[Player]) -> list[States]:
     """Play an episode for each player, as `steps_together` does, and return the states of each.
 
     Returns:
-        State dicts of `MultiRobotTask.get_state_dict`, each entry (T + 1, k) for T steps of its
+        State dicts of `TaskEnv.get_state_dict`, each entry (T + 1, k) for T steps of its
         player.
     """
     played = iter(_played_states(env, _acting(players)))
     return [next(played) if p.rehearsed is None else p.rehearsed.states for p in players]
 
 
-def record_together(env: MultiRobotTask, players: Sequence[Player]) -> list[PlayedEpisode]:
+def record_together(env: TaskEnv, players: Sequence[Player]) -> list[PlayedEpisode]:
     """Play an episode for each player, as `steps_together` does, and keep what happens.
 
     Raises:
@@ -163,7 +163,7 @@ def _acting(players: Sequence[Player]) -> list[Player]:
     return [player for player in players if player.rehearsed is None]
 
 
-def _played_states(env: MultiRobotTask, players: Sequence[Player]) -> list[States]:
+def _played_states(env: TaskEnv, players: Sequence[Player]) -> list[States]:
     if not players:
         return []
     happening = steps_together(env, players)
@@ -182,7 +182,7 @@ def _played_states(env: MultiRobotTask, players: Sequence[Player]) -> list[State
     ]
 
 
-def steps_together(env: MultiRobotTask, players: Sequence[Player]) -> Generator[None]:
+def steps_together(env: TaskEnv, players: Sequence[Player]) -> Generator[None]:
     """Play an episode for each player, from freshly built worlds, until all are over.
 
     Every player sees its own environment alone, and draws from generators that are its own, so

@@ -25,7 +25,7 @@ from robots.control_modes import plain_mode
 from robots.fingerprint import asset_fingerprint
 from rollouts.reading.guessed_robots import describe_guessed
 from rollouts.reading.manifest import FILE_NUMBER
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.native.format import observation_keys
 from tasks.registry import full_name
 
@@ -117,7 +117,7 @@ def _describe_group(group: JointGroup) -> dict[str, Any]:
     return {name: value for name, value in asdict(group).items() if name not in silent}
 
 
-def describe_simulation(task: MultiRobotTask) -> dict[str, Any]:
+def describe_simulation(task: TaskEnv) -> dict[str, Any]:
     """Return a task's physics settings (None: SAPIEN's own) and control frequency (Hz).
 
     And what varies in its worlds, if anything does.
@@ -209,7 +209,7 @@ def checksum(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) 
     return f"crc32 {found:08x}"
 
 
-def describe_task(task: MultiRobotTask, source: str, source_desc: str | None) -> dict[str, Any]:
+def describe_task(task: TaskEnv, source: str, source_desc: str | None) -> dict[str, Any]:
     """Return what every file of a recording says about all its episodes.
 
     Args:
@@ -220,7 +220,7 @@ def describe_task(task: MultiRobotTask, source: str, source_desc: str | None) ->
     Raises:
         AssetError: If robot files cannot be found.
     """
-    name, guessed = full_name(type(task)), describe_guessed(task.scenario.layout)
+    name, guessed = full_name(task.task_class), describe_guessed(task.scenario.layout)
     return {
         "env_info": {
             "env_id": task.task_id,
@@ -264,7 +264,7 @@ def _compared(header: Mapping[str, Any]) -> dict[str, Any]:
     return about
 
 
-def recorded_control_mode(task: MultiRobotTask) -> str | dict[str, str]:
+def recorded_control_mode(task: TaskEnv) -> str | dict[str, str]:
     """Return the control mode as native writes it: by robot where there are several.
 
     Where the arms of a robot have modes of their own, it is the mode by arm.

@@ -11,7 +11,7 @@ from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameErr
 from rollouts.reading.guessed_robots import guess_again
 from rollouts.reading.recording import Recording
 from rollouts.reading.summary import TrajectoryError
-from tasks import MultiRobotTask, get_task_class, make
+from tasks import MultiRobotTask, TaskEnv, get_task_class, make
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
 from tasks.varying.randomization import Randomization
@@ -56,7 +56,7 @@ def task_for(
     robots: RobotLike | Mapping[str, RobotLike] | None = None,
     bystanders: str | None = None,
     pictures: bool = False,
-) -> MultiRobotTask:
+) -> TaskEnv:
     """Make the task that a file was recorded in, with its robots where they stood.
 
     Args:

@@ -37,7 +37,7 @@ from rollouts.reading.provenance import (
     read_described,
 )
 from rollouts.reading.summary import MAX_STEPS, Entry, OwnEpisode, TrajectoryError, read_summary
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.episode import States
 from tasks.native.controllers import CONTROLLER
 
@@ -60,7 +60,7 @@ class Trajectory:
         seed: Seed of its reset; None if the file names none, or several.
         control_mode: See `rollouts.reading.summary.Summary`.
         actions: Flat actions, (T, A).
-        states: State dict of `MultiRobotTask.get_state_dict`, each entry (T + 1, k), the first
+        states: State dict of `TaskEnv.get_state_dict`, each entry (T + 1, k), the first
             row being the state after the reset; None if the file holds none.
         rewards: Shape (T,), or None if the file holds none.
         success: Shape (T,), or None.
@@ -238,7 +238,7 @@ class Recording(Sequence[Trajectory]):
                 )
         self._action_dim = action_dim
 
-    def expect_world(self, task: MultiRobotTask) -> None:
+    def expect_world(self, task: TaskEnv) -> None:
         """Refuse a task with another layout, robot files or physics than the recording had.
 
         Native's files do not say what they had; they pass.

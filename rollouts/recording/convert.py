@@ -81,7 +81,7 @@ def convert(
         RecordingError: If the folder cannot be written or holds a recording of something else.
     """
     with closing(task_for(file, **(cell or {}))) as source:
-        task = type(source)(replace(source.scenario, control_mode=mode))
+        task = source.task_class(replace(source.scenario, control_mode=mode))
         text = f"converted from {file.control_mode}"
         with (
             closing(task),

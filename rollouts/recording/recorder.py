@@ -39,7 +39,7 @@ from rollouts.recording.episode_files import (
 )
 from rollouts.recording.joined_files import JoinedFiles, OpenFile
 from rollouts.sources.actors import Source, combined, source_of
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.episode import PlayedEpisode
 
 __all__ = ["FILE_SIZE", "Recorder", "describe_layout"]
@@ -81,7 +81,7 @@ class Recorder:
     def __init__(
         self,
         path: str | os.PathLike[str],
-        task: MultiRobotTask,
+        task: TaskEnv,
         *,
         overwrite: bool = False,
         resume: bool = False,

@@ -20,6 +20,7 @@ from robots.registry import ROBOTS
 from rollouts.playing.seeds import checked_seeds
 from rollouts.reading.guessed_robots import descriptor_digest
 from rollouts.reading.manifest import spans_of
+from tasks.engine.env import built_layout
 from tasks.registry import full_name, get_task_class, make_scenario
 from tasks.varying.randomization import Randomization
 
@@ -105,7 +106,7 @@ class Case:
         object.__setattr__(self, "name", checked_name("a case", self.name or cls.task_id))
         scenario = make_scenario(cls, **self.making)
         scenario.check(cls.reward_modes)
-        cls.built_layout(scenario)  # refuses a layout that lacks the task's places
+        built_layout(cls, scenario)  # refuses a layout that lacks the task's places
 
     @property
     def making(self) -> MakingFields:

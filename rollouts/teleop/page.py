@@ -271,7 +271,7 @@ class TeleopPage:
         gui.configure_theme(show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
         Text(gui, session.task.task_id, bold=True)
-        Text(gui, read_docstring(type(session.task)).summary)
+        Text(gui, read_docstring(session.task.task_class).summary)
         for note in self._picture.notes:
             Text(gui, note)
         self._status, self._note = Text(gui, ""), Text(gui, "")

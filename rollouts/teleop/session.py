@@ -21,7 +21,7 @@ from rollouts.recording.recorder import Recorder
 from rollouts.sources.actors import PERSON, Actor, actor_of, episode_source
 from rollouts.sources.policies import check_policy
 from rollouts.teleop.steering import Steering
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.episode import REBUILT, PlayedEpisode, Policy, play
 
 SOMEBODY = Actor(PERSON, "browser")
@@ -67,7 +67,7 @@ class Session:
 
     def __init__(
         self,
-        task: MultiRobotTask,
+        task: TaskEnv,
         recorder: Recorder | None = None,
         seed: int = 0,
         *,

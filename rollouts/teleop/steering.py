@@ -22,7 +22,7 @@ from robots import TaskError
 from robots.action_split import is_gripper
 from robots.urdf.tcp import find_tcp
 from simulation import State
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.driving import DrivenGroup, driven_groups, joint_slices
 
 SPEED, TURN_SPEED = 0.5, 2.0  # of a TCP (m/s, rad/s)
@@ -44,7 +44,7 @@ class _Arm:
         others: Its other groups, such as fingers that are no gripper.
     """
 
-    def __init__(self, name: str, task: MultiRobotTask, driven: Sequence[DrivenGroup]) -> None:
+    def __init__(self, name: str, task: TaskEnv, driven: Sequence[DrivenGroup]) -> None:
         """Take the groups of an arm, one or more of which are no gripper."""
         self.name, layout = name, task.layout
         self._robot = layout.owner(name)
@@ -108,7 +108,7 @@ class Steering:
         reference: Where joints are driven to, those of all robots, (dof,) (rad, m).
     """
 
-    def __init__(self, task: MultiRobotTask) -> None:
+    def __init__(self, task: TaskEnv) -> None:
         """Take a task that has been reset.
 
         Raises:

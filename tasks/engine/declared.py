@@ -14,7 +14,7 @@ from layouts import Layout
 from robots import TaskError
 from robots.common.bounds import checked_flag, checked_number, checked_numbers, checked_whole, shown
 from simulation import Camera, PhysicsSettings
-from tasks.engine.declaration import DENSE_MODES, Declaration
+from tasks.engine.task import DENSE_MODES, Task
 from tasks.language.bodies import Body, Table, WideTable
 from tasks.varying.randomization import Randomization
 
@@ -27,18 +27,21 @@ HOOKS = {
     "dense_reward": ("state", "action", "info"),
     "remember": ("state",),
     "begin_episodes": ("state", "env_ids"),
+    "begin_step": (),
     "respond": ("state",),
     "reset_robots": ("world", "rng"),
 }
 """What a class may define, and what it is called with."""
 
-_ATTRIBUTES = tuple(Declaration.__annotations__)
+_ATTRIBUTES = tuple(name for name in Task.__annotations__ if not name.startswith("_"))
+_TASKS_OWN = frozenset((*_ATTRIBUTES, *vars(Task)))
+_STEPPING = ("__init__", "__new__", "reset", "step", "advance", "render", "close")
 _ALIKE = 0.85  # of two names, 1 being the same; below it one is hardly meant for the other
 _STEPS = 2**31 - 1
 
 
 @lru_cache(maxsize=1024)
-def check_declaration(cls: type[Declaration]) -> None:
+def check_declaration(cls: type[Task]) -> None:
     """Refuse a task's class that cannot work.
 
     Args:
@@ -58,7 +61,7 @@ def check_declaration(cls: type[Declaration]) -> None:
             f" truncated, such as max_episode_steps = 100{_meant(cls, 'max_episode_steps')}"
         )
     checked_whole(f"{task}.max_episode_steps", cls.max_episode_steps, 1, _STEPS, TaskError)
-    if cls.evaluate is Declaration.evaluate:
+    if cls.evaluate is Task.evaluate:
         raise TaskError(
             f"{task} does not define evaluate(self, state), which says where it is solved:"
             f" {{'success': (N,) bool}}{_meant(cls, 'evaluate')}"
@@ -69,13 +72,14 @@ def check_declaration(cls: type[Declaration]) -> None:
     _check_numbers(cls)
     _check_views(cls)
     _check_bodies(cls)
+    _check_methods(cls)
     for name, hook in _nearly_hooks(cls):
         warnings.warn(
             f"{task} defines {name!r}, which nothing calls. Did you mean {hook!r}?", stacklevel=3
         )
 
 
-def _check_layout(cls: type[Declaration]) -> None:
+def _check_layout(cls: type[Task]) -> None:
     task = cls.__name__
     if "layout" not in _known(cls):
         raise TaskError(
@@ -102,9 +106,9 @@ def _check_layout(cls: type[Declaration]) -> None:
         )
 
 
-def _check_hook(cls: type[Declaration], name: str, arguments: tuple[str, ...]) -> None:
+def _check_hook(cls: type[Task], name: str, arguments: tuple[str, ...]) -> None:
     task, hook = cls.__name__, inspect.getattr_static(cls, name)
-    if hook is vars(Declaration)[name]:
+    if hook is vars(Task)[name]:
         return
     written = f"def {name}({', '.join(('self', *arguments))})"
     method = getattr(cls, name)
@@ -123,7 +127,7 @@ def _check_hook(cls: type[Declaration], name: str, arguments: tuple[str, ...]) -
         raise TaskError(f"{task}.{name} must return its result; it has async or yield")
 
 
-def _check_rewards(cls: type[Declaration]) -> None:
+def _check_rewards(cls: type[Task]) -> None:
     task, modes = cls.__name__, cls.reward_modes
     known = isinstance(modes, tuple) and all(mode in DENSE_MODES for mode in modes)
     if not known or not modes:
@@ -131,7 +135,7 @@ def _check_rewards(cls: type[Declaration]) -> None:
             f"{task}.reward_modes is {shown(modes)}; a tuple of {', '.join(DENSE_MODES)} is needed,"
             " the default first"
         )
-    if cls.dense_reward is Declaration.dense_reward and {"dense", "normalized_dense"} & {*modes}:
+    if cls.dense_reward is Task.dense_reward and {"dense", "normalized_dense"} & {*modes}:
         raise TaskError(
             f"{task}.reward_modes has {modes[0]!r}, but it does not define dense_reward(self,"
             f" state, action, info){_meant(cls, 'dense_reward')}"
@@ -139,7 +143,7 @@ def _check_rewards(cls: type[Declaration]) -> None:
     checked_number(f"{task}.max_reward", cls.max_reward, 1e-6, 1e6, TaskError)
 
 
-def _check_numbers(cls: type[Declaration]) -> None:
+def _check_numbers(cls: type[Task]) -> None:
     task = cls.__name__
     checked_whole(f"{task}.first_seed", cls.first_seed, 0, 2**32 - 1, TaskError)
     checked_flag(f"{task}.rebuilds", cls.rebuilds, TaskError)
@@ -160,7 +164,7 @@ def _check_numbers(cls: type[Declaration]) -> None:
         )
 
 
-def _check_views(cls: type[Declaration]) -> None:
+def _check_views(cls: type[Task]) -> None:
     task = cls.__name__
     if not isinstance(cls.instruction, str):
         raise TaskError(f"{task}.instruction is {shown(cls.instruction)}; a sentence is needed")
@@ -180,7 +184,7 @@ def _check_views(cls: type[Declaration]) -> None:
         checked_numbers(f"{task}.viewpoint's {what}", point, 3, 1e6, TaskError, "m")
 
 
-def _check_bodies(cls: type[Declaration]) -> None:
+def _check_bodies(cls: type[Task]) -> None:
     task = cls.__name__
     if not isinstance(cls.table, (Table, WideTable)):
         raise TaskError(
@@ -194,18 +198,22 @@ def _check_bodies(cls: type[Declaration]) -> None:
                     f"{task}.{name} is the class {value.__name__}; a body is one that it makes:"
                     f" {name} = {value.__name__}(…)"
                 )
-    engine = _engine(cls)
     for name in cls.bodies:
-        if name != "table" and hasattr(engine, name):
+        if name != "table" and name in _TASKS_OWN:
             raise TaskError(
                 f"{task}.{name} is a body, but {name!r} is a name that every task has for something"
                 " else; call it something else"
             )
 
 
-def _engine(cls: type[Declaration]) -> type:
-    """Return the class that runs tasks, of which a task's class is one."""
-    return next(base for base in cls.__mro__ if base.__module__ == "tasks.engine.task")
+def _check_methods(cls: type[Task]) -> None:
+    """Refuse what only what steps a task could call."""
+    for name, value in _own(cls):
+        if name in _STEPPING and isinstance(value, FunctionType):
+            raise TaskError(
+                f"{cls.__name__} defines {name}, which nothing calls: tasks are stepped by"
+                f" tasks.TaskEnv, and define {', '.join(HOOKS)}"
+            )
 
 
 def _known(cls: type) -> set[str]:
@@ -219,14 +227,14 @@ def _own(cls: type) -> Iterator[tuple[str, Any]]:
             yield from vars(base).items()
 
 
-def _meant(cls: type[Declaration], name: str) -> str:
+def _meant(cls: type[Task], name: str) -> str:
     """Return the name of the class's own that was meant for ``name``, if there is one."""
     names = [own for own, _ in _own(cls) if not own.startswith("_") and own not in HOOKS]
     match = get_close_matches(name, names, 1, _ALIKE)
     return f". Is {match[0]!r} meant to be it?" if match else ""
 
 
-def _nearly_hooks(cls: type[Declaration]) -> Iterator[tuple[str, str]]:
+def _nearly_hooks(cls: type[Task]) -> Iterator[tuple[str, str]]:
     """Yield methods that nothing of the class uses, and what each may have been meant for."""
     own = dict(_own(cls))
     missing = [name for name in (*HOOKS, *_ATTRIBUTES) if name not in own]
@@ -234,7 +242,7 @@ def _nearly_hooks(cls: type[Declaration]) -> Iterator[tuple[str, str]]:
     for name, value in own.items():
         if name.startswith("_") or name in used or isinstance(value, Body):
             continue
-        if hasattr(_engine(cls), name):
+        if name in _TASKS_OWN:
             continue
         if match := get_close_matches(name, missing, 1, _ALIKE):
             yield name, match[0]

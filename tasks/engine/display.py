@@ -10,7 +10,7 @@ from layouts.display import layout_html
 from robots import RobotDescriptor
 from robots.display import heading, table
 
-Task = Any  # a `MultiRobotTask`, whose module needs this one
+Task = Any  # a `TaskEnv`, whose module needs this one
 Scenario = Any  # likewise
 
 
@@ -24,7 +24,7 @@ def task_text(task: Task) -> str:
 
 def task_html(task: Task) -> str:
     """Return the same with the first paragraph of its docstring and the layout's picture."""
-    about = inspect.cleandoc(type(task).__doc__ or "").partition("\n\n")[0]
+    about = inspect.cleandoc(task.task_class.__doc__ or "").partition("\n\n")[0]
     return (
         f"{heading(_title(task), ' '.join(about.split()) or _size(task))}"
         f"{table((), {'made': _size(task), **task_rows(task)}.items())}"
@@ -83,7 +83,7 @@ def _changed(value: Any) -> dict[str, str]:
 
 
 def _title(task: Task) -> str:
-    return task.task_id or type(task).__name__
+    return task.task_id or task.task_class.__name__
 
 
 def _size(task: Task) -> str:

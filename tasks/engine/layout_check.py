@@ -7,7 +7,7 @@ from functools import lru_cache
 
 from layouts import Layout
 from robots import LayoutError, MissingPackageError
-from tasks.engine.declaration import Declaration
+from tasks.engine.task import Task
 
 Rectangle = tuple[float, float, float, float]
 
@@ -42,7 +42,7 @@ def refuse_collisions(layout: Layout, table: Rectangle | None = None) -> None:
         )
 
 
-def is_tested(cls: type[Declaration], layout: Layout) -> bool:
+def is_tested(cls: type[Task], layout: Layout) -> bool:
     """Tell whether a layout is the own one of a task of this library, which its tests check."""
     return cls.__module__.startswith("tasks.") and layout == cls.layout
 

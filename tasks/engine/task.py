@@ -1,504 +1,223 @@
-"""The batched task: N worlds of one layout with resets, observations, rewards and success."""
+"""What a user declares: a task, which knows nothing of what steps it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, cast
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
-import torch
-from gymnasium.spaces import Box
-from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
-from torch import Tensor
 
 from layouts import Layout
-from robots import SimulationError, TaskError
-from simulation import Simulation, State, World
-from simulation.maths import Floats, all_finite
-from tasks.engine.actions import ActionReader
-from tasks.engine.arguments import (
-    ELAPSED,
-    check_info,
-    checked_ids,
-    checked_seeds,
-    wants_rebuild,
-)
-from tasks.engine.bystanders import check_needs, check_places, settled
-from tasks.engine.declaration import Declaration, Info
-from tasks.engine.declared import check_declaration
-from tasks.engine.display import task_html, task_text
-from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
-from tasks.engine.layout_check import is_tested, refuse_collisions
+from simulation import Camera, PhysicsSettings, Simulation, State, World
+from simulation.maths import Array, Floats
 from tasks.engine.memory import Memory
-from tasks.engine.observation import Observer, read_mode, space_of
-from tasks.engine.remade import Remade
-from tasks.engine.returned import ReturnedArrays, ReturnedReward, expect_nothing, unchanged
 from tasks.engine.scenario import Scenario
-from tasks.engine.speeds import SpeedWatch
-from tasks.engine.varied import Varied
+from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
+from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
-from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
-from tasks.varying.distractors import add_distractors, area_of
+from tasks.varying.distributions import Distribution, Normal
+from tasks.varying.noise import noise
+from tasks.varying.randomization import Randomization
 from tasks.varying.varying import Varying
 
+Info = dict[str, Any]
 
-class _FreshScenario:
-    """``cls.scenario``: a new scenario at every access, made from the class's own attributes."""
-
-    def __get__(self, instance: object, owner: type[MultiRobotTask]) -> Scenario:
-        """Return it; a task that was made has its own as an attribute."""
-        return Scenario(
-            layout=owner.layout, physics=owner.physics, randomization=owner.randomization
-        )
+DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
+SPARSE_MODES = ("sparse", "none")
+_NORMAL = Normal(1.0)
 
 
-class MultiRobotTask(Declaration, Varied, Remade):
-    """A task that can be stepped: what users subclass, and what `tasks.make` returns.
+class Task:
+    """Something to achieve, for one robot or many; users subclass `tasks.MultiRobotTask`.
 
-    What a subclass sets and defines stands in `tasks.engine.declaration.Declaration`; what follows
-    runs it.
+    A class sets ``layout`` and ``max_episode_steps``, declares its bodies as class attributes
+    (`tasks.language.bodies`), and defines success in `evaluate`. It may define `observe` and
+    `dense_reward` as well, and override `build` and `sample`, which add and place the declared
+    bodies.
+
+    `tasks.make`, and calling the class with a scenario, return a `TaskEnv`, which steps it: that
+    holds one instance of the class, whose methods it calls. Beside what the class declares, they
+    find there what the environments are made with.
 
     Attributes:
-        scenario: A fresh scenario of the class at every access; that of a task that was made is the
-            one it was made from.
-        control_mode: Control mode of all robots, or those by arm.
+        task_id: The task's id.
+        native_id: Id of the ManiSkill task that it clones; None for a task of our own.
+        source: Where its numbers come from; of a clone package, version and file.
+        layout: Default layout; in methods, that of the environments.
+        table: What the robots stand at, the first of its bodies.
+        bodies: The bodies that its class declares, by name, in the order declared; see
+            `tasks.language.bodies`.
+        robot_counts: How many robots a layout may have, in places of any names; None if it takes
+            exactly the places of ``layout``.
+        needs: What places need of their robots, by place, ``"*"`` for all others; see
+            `tasks.Needs`.
+        physics: Solver settings; None keeps SAPIEN's own defaults.
+        randomization: What varies from episode to episode; None for nothing.
+        max_episode_steps: Control steps until an episode is truncated.
+        reward_modes: Reward modes, the default first.
+        max_reward: What ``normalized_dense`` divides the dense reward by.
+        first_seed: Environment i starts with seed ``first_seed + i`` when it is made.
+        rebuilds: Whether every reset builds the worlds anew, with a new `design`.
+        viewpoint: Camera position and target of `render` (m, world).
+        cameras: Cameras that observe, where images are asked for; those of the robots come after.
+        instruction: What is to be done, in a sentence, for robots that are told so; the beginning
+            of the class's docstring if empty.
+        sensed: Which parts of `observe` a real robot knows, so that they are observed beside
+            images; the others are privileged. ``*`` stands for any letters.
+        scenario: A fresh scenario of the class at every access; in methods, the one that the
+            environments are made with.
         num_envs: Number of environments N.
-        single_action_space: Action of one environment, (A,); joint limits (rad) where the control
-            mode asks for positions, else [-1, 1].
-        action_space: Actions of all environments, (N, A).
-        action_split: Robot name → slice of the flat action, in declared order.
+        control_mode: Control mode of all robots, or those by arm.
+        simulation: The worlds.
         moving: Which environments the present step advances.
         memory: What `remember` returned, as attributes.
-        observer: What puts its observations together, and its cameras.
-        observation_slices: Where each named part stands in the flat observation.
-        state_was_set: Whether `set_state_dict` was called since all worlds were last built anew:
-            what happens then does not follow from seeds and actions alone.
-        start: Observation and info of the first reset, when it was made.
     """
 
-    scenario: Scenario = cast(Scenario, _FreshScenario())
-    state_was_set: bool = False
+    scenario: Scenario
+    num_envs: int
+    control_mode: str | dict[str, str]
+    simulation: Simulation
+    moving: Sequence[int]
+    memory: Memory
+    _varying: Varying | None
+    _rngs: Sequence[EpisodeRandom]
+    _elapsed: NDArray[np.int32]
 
-    # -- making and closing ------------------------------------------------------------------
+    task_id: ClassVar[str] = ""
+    native_id: ClassVar[str | None] = None
+    source: ClassVar[str] = ""
+    layout: Layout
+    table: ClassVar[Table | WideTable] = Table()
+    bodies: ClassVar[Mapping[str, Declared]] = {}
+    robot_counts: ClassVar[range | None] = None
+    needs: ClassVar[Mapping[str, Needs]] = {}
+    physics: ClassVar[PhysicsSettings | None] = None
+    randomization: ClassVar[Randomization | None] = None
+    max_episode_steps: int
+    reward_modes: ClassVar[tuple[str, ...]] = ()
+    max_reward: ClassVar[float] = 1.0
+    first_seed: ClassVar[int] = 0
+    rebuilds: ClassVar[bool] = False
+    viewpoint: ClassVar[tuple[tuple[float, float, float], tuple[float, float, float]]] = (
+        (0.6, 0.7, 0.6),
+        (0.0, 0.0, 0.35),
+    )
+    cameras: ClassVar[tuple[Camera, ...]] = (Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)),)
+    instruction: ClassVar[str] = ""
+    sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
 
-    def __init__(self, scenario: Scenario, *, first_seed: int | None = None) -> None:
-        """Build the worlds and begin episodes with the class's first seeds.
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Collect the declared bodies; offer dense modes if there is a dense reward."""
+        super().__init_subclass__(**kwargs)
+        cls.bodies = declared_bodies(cls)
+        if "reward_modes" not in cls.__dict__:
+            dense = cls.dense_reward is not Task.dense_reward
+            cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
+
+    def design(self, rng: EpisodeRandom) -> Any:
+        """Draw the geometry of one environment; `build` finds it as ``world.design``."""
+        return None
+
+    def build(self, world: World) -> None:
+        """Add the task's bodies to a world, in the order declared; the robots stand already."""
+        for name, body in self.bodies.items():
+            body.add_to(world, name)
+
+    def sample(self, world: World, rng: EpisodeRandom) -> None:
+        """Place the task's bodies for a new episode; the robots are placed already."""
+        for name, body in self.bodies.items():
+            body.place(world, name, rng)
+
+    def evaluate(self, state: State) -> dict[str, Array]:
+        """Return ``success`` (N,) bool and whatever else describes the state.
+
+        Arrays, as the state gives them: they reach the user as tensors.
+        """
+        raise NotImplementedError
+
+    def observe(self, state: State, info: Info) -> dict[str, Array]:
+        """Return named parts of the observation, each (N, k) or (N,), after the robots' own."""
+        return {}
+
+    def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
+        """Return the dense reward, (N,)."""
+        raise NotImplementedError
+
+    def remember(self, state: State) -> Mapping[str, Array]:
+        """Return what later steps look back at, by name, each (N, …), as it is after a reset.
+
+        The task finds it as an attribute of `memory` and may change it there; the rows of
+        environments that are reset are taken anew.
+        """
+        return {}
+
+    def begin_episodes(self, state: State, env_ids: Sequence[int]) -> None:
+        """Do what a new episode needs besides; called after ``env_ids`` were reset."""
+
+    def begin_step(self) -> None:
+        """Refuse a control step that cannot be taken, by raising an error; nothing has moved yet.
+
+        Only the environments in ``moving`` take the step.
+        """
+
+    def respond(self, state: State) -> None:
+        """Move bodies in answer to a control step, before the step is judged.
+
+        Called after every step's physics if a subclass has it; the state is read anew then.
+        Only the environments in ``moving`` take the step.
+        """
+
+    def reset_robots(self, world: World, rng: EpisodeRandom) -> None:
+        """Stand every robot at its placement, with joint noise."""
+        for name, off in rng.joint_noise(world.layout).items():
+            self.stand(world, name, off)
+
+    def stand(self, world: World, robot: str, noise: NDArray[Any]) -> None:
+        """Stand a robot at its placement, off its keyframe by ``noise``, (dof,) (rad, m).
+
+        Groups without reset noise stay exact. The sum is taken in the type of ``noise``.
+        """
+        placement = world.layout[robot]
+        groups = placement.robot.action_split.groups.values()
+        noisy = [group.reset_noise for group in groups for _ in group.joints]
+        qpos = np.array(placement.start_qpos, noise.dtype)
+        world.stand(robot, np.where(noisy, noise + qpos, qpos))
+
+    def drawn(self, env: int = 0) -> dict[str, Any] | None:
+        """Return what was drawn for an environment's episode, by axis and name, as plain data.
 
         Args:
-            scenario: How to make it; `tasks.make` and ``cls.scenario`` give one to start from.
-            first_seed: Environment i starts with seed ``first_seed + i``; None takes the class's.
-
-        Raises:
-            TaskError: If the scenario asks for what the task does not offer.
-            SimulationError: If a control step is no whole number of physics steps.
-            LayoutError: If the robots of the layout collide.
-            AssetError: If robot files cannot be found.
-        """
-        own = type(self)
-        check_declaration(own)
-        scenario.check(self.reward_modes)
-        layout = own.built_layout(scenario)
-        if scenario.check_layout and not is_tested(own, scenario.layout):
-            refuse_collisions(scenario.layout, self.table.outline(scenario.layout))
-        self.scenario = scenario
-        self.layout = layout
-        self.control_mode = scenario.layout.control_mode(scenario.control_mode)
-        self.num_envs = scenario.num_envs
-        self.obs_mode = scenario.obs_mode
-        self.reward_mode = scenario.reward_mode or self.reward_modes[0]
-        if scenario.max_episode_steps is not None:
-            self.max_episode_steps = scenario.max_episode_steps
-        self.action_split = self.layout.action_split
-        low, high = np.array(self.layout.action_bounds, np.float32).T
-        rows = self.num_envs, 1
-        self.single_action_space = Box(low, high, dtype=np.float32)
-        self.action_space = Box(np.tile(low, rows), np.tile(high, rows), dtype=np.float32)
-        self._reader = ActionReader(self.layout, self.num_envs)
-        mode = read_mode(scenario.obs_mode)
-        cameras = scenario.cameras or self.cameras if mode.textures else ()
-        size = scenario.camera_size
-        self.observer = Observer(self.layout, mode, cameras, self.sensed, self.viewpoint, size)
-        first = self.first_seed if first_seed is None else first_seed
-        self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
-        self._max_reward = np.array(self.max_reward, np.float32)
-        self._elapsed = np.zeros(self.num_envs, np.int32)
-        self._everywhere: Sequence[int] = range(self.num_envs)
-        self.moving = self._everywhere
-        self.memory = Memory()
-        self._expect_returns(own.__name__)
-        self._varying: Varying | None = None
-        self._simulation: Simulation | None = Simulation(
-            self.layout,
-            self._build_world,
-            self.num_envs,
-            scenario.physics,
-            control_frequency=scenario.control_frequency,
-            visuals=scenario.draws,
-            links_pass=own.native_id is not None,
-            simulator=scenario.simulator,
-        )
-        self._speeds = SpeedWatch(self._simulation)
-        if scenario.randomization:
-            self._varying = Varying(
-                scenario.randomization,
-                self._simulation,
-                scenario.cameras or self.cameras,
-                area_of(self.table.outline(layout), self.viewpoint[1]),
-            )
-            self._draw(self._everywhere)
-            if self._varying.rebuilds:
-                self._simulation.rebuild(self._everywhere, self._build_again)
-        self._camera: Any = None
-        self._responds = type(self).respond is not Declaration.respond
-        self.start = self._begin(list(range(self.num_envs)), reconfigured=True)
-        self._describe_observation()
-
-    @classmethod
-    def built_layout(cls, scenario: Scenario) -> Layout:
-        """Return the layout that a task of a scenario is built with, in its control mode.
-
-        Raises:
-            TaskError: If its places are not the task's, or a robot lacks what its place needs.
-            DescriptorError: If a robot lacks the joint limits that the control mode needs.
-        """
-        name, given, places = cls.__name__, scenario.layout, cls.layout.places
-        check_places(name, given, places, cls.robot_counts, scenario.bystanders)
-        check_needs(name, given, given.places if cls.robot_counts else places, cls.needs)
-        still = settled(given, places, cls.robot_counts, scenario.bystanders)
-        return still.in_control_mode(scenario.control_mode)
-
-    def __repr__(self) -> str:
-        """Show what it is and what was made of it, in a few lines."""
-        made = "observation_slices" in vars(self)
-        return task_text(self) if made else object.__repr__(self)
-
-    def _repr_html_(self) -> str:
-        """Show a notebook the same, with the layout's picture."""
-        return task_html(self)
-
-    @property
-    def seeds(self) -> list[int]:
-        """What the random streams of each environment last began with."""
-        return [rng.seed for rng in self._rngs]
-
-    @property
-    def simulation(self) -> Simulation:
-        """The worlds.
-
-        Raises:
-            SimulationError: If the task was closed.
-        """
-        if self._simulation is None:
-            raise SimulationError(f"this {type(self).__name__} is closed; make a new one")
-        return self._simulation
-
-    @property
-    def state(self) -> State:
-        """What all worlds look like now, as `evaluate` is given it; read anew after each step.
-
-        Raises:
-            SimulationError: If the task was closed.
-        """
-        return self.simulation.read()
-
-    def close(self) -> None:
-        """Let the worlds go; closing twice is allowed."""
-        self._simulation = None
-        self._camera = None
-        for holder in ("_state", "_speeds"):  # of the worlds as well
-            vars(self).pop(holder, None)
-        self.observer.close()
-
-    # -- episodes ----------------------------------------------------------------------------
-
-    def reset(
-        self,
-        seed: int | Sequence[int | None] | None = None,
-        options: Mapping[str, Any] | None = None,
-        env_ids: Sequence[int] | None = None,
-    ) -> tuple[Any, Info]:
-        """Begin new episodes.
-
-        Args:
-            seed: ``k`` seeds environment i with k + i; a list gives each of ``env_ids`` its own;
-                None, also in a list, lets the random streams run on.
-            options: ``{"reconfigure": True}`` rebuilds the worlds, so that nothing of their
-                past is left in PhysX.
-            env_ids: Which environments; all if None. The others go on as they are.
+            env: The number of the environment.
 
         Returns:
-            Observation and info of all environments.
-
-        Raises:
-            TaskError: If an argument makes no sense; nothing is reset then.
+            Such as ``{"mass": {"cube": 1.31}}``; see `tasks.Randomization`. None if nothing varies.
         """
-        ids = checked_ids(env_ids, self.num_envs)
-        seeds = checked_seeds(seed, ids)
-        reconfigure = wants_rebuild(options) or self.rebuilds
-        self.simulation.touched()
-        for i, own_seed in zip(ids, seeds, strict=True):
-            if own_seed is not None:
-                self._rngs[i].restart(own_seed)
-                continue
-            self._rngs[i].resets += 1
-            if reconfigure:
-                self._rngs[i].reseed_for_rebuild()
-        self._draw(ids)
-        again = self._varying is not None and self._varying.rebuilds
-        if reconfigure:
-            self.simulation.rebuild(ids, self._build_world)
-            self.state_was_set &= len(ids) < self.num_envs
-        elif again:
-            self.simulation.rebuild(ids, self._build_again)
-        return self._begin(ids, reconfigured=reconfigure or again)
+        return None if self._varying is None else self._varying.drawn(env)
 
-    def step(
-        self, action: Any, env_ids: Sequence[int] | None = None
-    ) -> tuple[Any, Tensor, Tensor, Tensor, Info]:
-        """Advance environments by one control step.
+    def standing(self, env: int = 0) -> Layout:
+        """Return the layout as robots stand in the present episode of an environment.
 
-        There is no automatic reset, and stepping past truncation is allowed.
-
-        Args:
-            action: (N, A) tensor or array in the order of ``action_split``, or a mapping
-                robot name → (N, a); normalised numbers beyond [-1, 1] are clipped, joint
-                positions beyond their limits are not.
-            env_ids: Which environments move; all if None. The others stand still, and what is
-                returned for them means nothing.
-
-        Returns:
-            Observation, reward (N,) float32, terminated (N,), truncated (N,), info. An
-            environment terminates when it succeeds.
-
-        Raises:
-            ActionError: If the action has a wrong shape, type or number; nothing moves then.
-            SimulationError: If physics diverged: a pose is not finite, or a joint moves at a
-                hundred times its largest speed. At ten times a `RuntimeWarning` says so.
-            TaskError: If the task's reward or observation is not finite.
+        It is ``layout``, unless the bases of robots vary. What is planned is planned in this one.
         """
-        obs, reward, terminated, truncated, info = self.advance(action, env_ids)
-        observed = _tensor(obs) if isinstance(obs, np.ndarray) else _tensors(obs)
-        details = dict(zip(info, map(_tensor, info.values()), strict=True))
-        return observed, _tensor(reward), _tensor(terminated), _tensor(truncated), details
+        return self.layout if self._varying is None else self._varying.layout(env)
 
-    def advance(
-        self, action: Any, env_ids: Sequence[int] | None = None
-    ) -> tuple[Any, Floats, NDArray[np.bool_], NDArray[np.bool_], Info]:
-        """Do what `step` does, and return NumPy arrays where it returns tensors."""
-        flat, simulation = self._reader.read(action), self.simulation
-        ids = None if env_ids is None else checked_ids(env_ids, self.num_envs)
-        self.moving = self._everywhere if ids is None else ids
+    def scale(self, body: str) -> Floats:
+        """Return the factor by which a body is larger than declared, (N,); 1 if sizes are fixed."""
         if self._varying is None:
-            simulation.step(flat, self._state.joint_positions, ids)
-        else:
-            before = self._state.joint_positions
-            self._varying.step(simulation, flat, before, self.moving, self._elapsed)
-        if ids is None:
-            self._elapsed += _ONE
-        else:
-            self._elapsed[ids] += 1
-        state = self._read()
-        self._speeds.look(state, self.moving, self._elapsed)
-        if self._responds:
-            expect_nothing(self, "respond", self.respond(state))
-            self.simulation.touched()
-            state = self._read()
-        info = self._info(state)
-        self.observer.changed(self.moving)
-        obs = self._observation(state, info, self.moving)
-        reward = self._reward(state, flat, info)
-        truncated = self._elapsed >= self.max_episode_steps
-        return obs, reward, info["success"].copy(), truncated, info
+            return np.ones(self.num_envs, np.float32)
+        return self._varying.scale(body)
 
-    def trust(self, actions: Floats) -> None:
-        """Take what is in this very array, (N, A), as actions that were checked before."""
-        self._reader.checked = actions
-
-    def get_state_dict(self) -> StateDict:
-        """Return all poses and velocities under native's keys; see `native_format`."""
-        return read_state_dict(self.simulation, self._state)
-
-    def begin_tape(self) -> StateTape:
-        """Return a tape of states for the present episode; see `write_tape`."""
-        return StateTape(self.simulation)
-
-    def write_tape(self, tape: StateTape) -> None:
-        """Add the present state to a tape: what `get_state_dict` returns, much cheaper."""
-        tape.write(self._state)
-
-    def set_state_dict(
-        self, state: Mapping[str, Mapping[str, Any]], env_ids: Sequence[int] | None = None
-    ) -> None:
-        """Put environments into a state, row by row.
+    def noise(self, name: str, width: int, drawn: Distribution = _NORMAL) -> Floats:
+        """Return noise for `observe`, a function of each episode's seed and step alone.
 
         Args:
-            state: What `get_state_dict` returns, with one row per environment set.
-            env_ids: Which environments; all if None.
+            name: What it is for; another name draws other numbers.
+            width: How many numbers each environment gets.
+            drawn: What each is drawn from; if not given, of mean 0 and deviation 1.
 
-        Raises:
-            TaskError: If a key, a shape or a number is wrong, see `native_format`; nothing is
-                changed then.
+        Returns:
+            Shape (N, width).
         """
-        ids = checked_ids(env_ids, self.num_envs)
-        write_state_dict(self.simulation, state, ids)
-        self.state_was_set = True
-        self.observer.changed(ids)
-        self._read()
-
-    def flat_state(self) -> Floats:
-        """Return what ``obs_mode="state"`` observes, (N, D), whatever the task's own mode is."""
-        state = self._state
-        parts = self.observe(state, self._info(state))
-        observer = Observer(self.layout, read_mode("state"), (), (), self.viewpoint)
-        return observer.observe(self.simulation, state, parts)
-
-    def render(self) -> np.ndarray:
-        """Return a picture of every environment, (N, 512, 512, 3) uint8.
-
-        Raises:
-            TaskError: If the task was not made with ``render_mode="rgb_array"``.
-        """
-        if self.scenario.render_mode is None:
-            raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
-        if self._camera is None:
-            from simulation.rendering.pictures import Cameras
-
-            self._camera = Cameras(self.simulation, *self.viewpoint)
-        return self._camera.take()
-
-    # -- inside ------------------------------------------------------------------------------
-
-    def _expect_returns(self, name: str) -> None:
-        """Say what the methods of the class must return."""
-        count = self.num_envs
-        self._judged = ReturnedArrays(f"{name}.evaluate()", count, judges=True)
-        self._observed = ReturnedArrays(f"{name}.observe()", count, axes=2)
-        self._remembered = ReturnedArrays(f"{name}.remember()", count)
-        self._rewards = ReturnedReward(f"{name}.dense_reward()", count)
-
-    def _build_world(self, world: World, index: int) -> None:
-        rng = self._rngs[index]
-        world.design = self.design(rng)
-        if self._varying is not None:
-            self._varying.describe(world, index)
-        self._fill(world)
-        rng.restart_numpy()
-
-    def _build_again(self, world: World, index: int) -> None:
-        """Build the same world with what varies, which leaves the task's draws as they are."""
-        assert self._varying is not None
-        world.design = self.simulation.worlds[index].design
-        self._varying.describe(world, index)
-        self._fill(world)
-
-    def _fill(self, world: World) -> None:
-        expect_nothing(self, "build", self.build(world))
-        if (varied := self.scenario.randomization) and varied.distractors:
-            add_distractors(world, varied.distractors)
-
-    def _draw(self, ids: Iterable[int]) -> None:
-        """Draw what varies in the coming episodes."""
-        if self._varying is not None:
-            for i in ids:
-                self._varying.begin(i, self._rngs[i].stream)
-
-    def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
-        self.simulation.clear(ids)
-        if self._varying is not None:
-            self._varying.apply(self.simulation, ids)
-        for i in ids:  # all that is placed here reaches the simulator in one go
-            world = self.simulation.worlds[i]
-            expect_nothing(self, "reset_robots", self.reset_robots(world, self._rngs[i]))
-            expect_nothing(self, "sample", self.sample(world, self._rngs[i]))
-        if reconfigured:
-            self._camera = None
-        self._elapsed[ids] = 0
-        self._speeds.begin(ids)
-        state = self._read()
-        if self._varying is not None and self._varying.scatter(self.simulation, state, ids):
-            state = self._read()
-        self.simulation.hold(state)
-        if self._varying is not None:
-            self._varying.rest(self.simulation, state, ids)
-        self.memory.renew(self._remembered.checked(self.remember(state)), ids)
-        expect_nothing(self, "begin_episodes", self.begin_episodes(state, ids))
-        info = self._info(state)
-        check_info(type(self).__name__, info)
-        self.observer.changed(ids)
-        obs = self._observation(state, info, ids)
-        if self._varying is not None:
-            info |= self._varying.info()
-        return _tensors(obs), {**_tensors(info), "reconfigure": reconfigured}
-
-    def _describe_observation(self) -> None:
-        """Read spaces and slices off the first observation."""
-        state, mode, name = self._read(), self.observer.mode, type(self).__name__
-        with unchanged(state, f"{name}.evaluate()"):
-            info = self._info(state)
-        with unchanged(state, f"{name}.observe()"):
-            parts = {} if mode.nothing else self._observed.checked(self.observe(state, info))
-        self.observation_slices = self.observer.slices(self.simulation, state, parts)
-        if not mode.nothing:
-            self.single_observation_space = space_of(self.start[0], batched=True)
-            self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-
-    def _read(self) -> State:
-        state = self.simulation.read()
-        if not all_finite(state.all_poses):
-            before = vars(self).get("_state")
-            self._state = state
-            refuse_state(state, before, self._speeds, self._elapsed)
-        self._state = state
-        return state
-
-    def _info(self, state: State) -> Info:
-        judged = self._judged.checked(self.evaluate(state))
-        return {ELAPSED: self._elapsed.copy(), **judged}
-
-    def _observation(self, state: State, info: Info, ids: Sequence[int]) -> Any:
-        """Return what is observed of all environments, of which those in ``ids`` have moved."""
-        mode = self.observer.mode
-        if mode.nothing:
-            return {}
-        parts = {} if mode.columns else self._observed.checked(self.observe(state, info))
-        varying = self._varying
-        try:
-            if varying is None:
-                return self.observer.observe(self.simulation, state, parts)
-            noisy = varying.sensors(lambda: self.observer.names(parts), self._elapsed)
-            return varying.seen(self.observer.observe(self.simulation, state, parts, noisy), ids)
-        except NotFinite:
-            refuse_observation(state, parts, self, self._speeds, self._elapsed)
-
-    def _reward(self, state: State, action: Floats, info: Info) -> Floats:
-        match self.reward_mode:
-            case "normalized_dense":
-                return self._dense(state, action, info) / self._max_reward
-            case "dense":
-                return self._dense(state, action, info)
-            case "sparse":
-                return info["success"].astype(np.float32)
-            case _:
-                return np.zeros(self.num_envs, np.float32)
-
-    def _dense(self, state: State, action: Floats, info: Info) -> Floats:
-        if self._rewards.dtype is None:  # the first
-            with unchanged(state, f"{type(self).__name__}.dense_reward()"):
-                reward = self._rewards.checked(self.dense_reward(state, action, info))
-        else:
-            reward = self._rewards.checked(self.dense_reward(state, action, info))
-        if not all_finite(reward):
-            refuse_reward(reward, self, self._elapsed)
-        return reward
-
-
-_tensor = torch.from_numpy
-_ONE = np.array(1, np.int32)  # which NumPy adds in a third of the time that 1 takes
-
-
-def _tensors(tree: Any) -> Any:
-    """Return arrays, or mappings of them, as users get them: tensors that share their memory."""
-    if isinstance(tree, dict):
-        return {key: _tensors(value) for key, value in tree.items()}
-    return _tensor(tree)
+        streams = [rng.stream for rng in self._rngs]
+        return noise(streams, self._elapsed.tolist(), drawn, width, "observe", name)

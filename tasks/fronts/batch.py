@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from robots import TaskError
 from tasks.engine.arguments import RECONFIGURE, SEED
+from tasks.engine.env import MultiRobotTask
 from tasks.engine.observation import observed_dtype
 from tasks.engine.scenario import Scenario
-from tasks.engine.task import MultiRobotTask
-from tasks.fronts.gymnasium import as_array, stepper
+from tasks.fronts.gymnasium import as_array
 
 Arrays = dict[str, NDArray[Any]]
 Shapes = Mapping[str, tuple[tuple[int, ...], str]]
@@ -68,7 +68,7 @@ class Batch:
         """
         scenario = replace(part.scenario, num_envs=len(part.env_ids))
         self._task = part.task(scenario, first_seed=part.task.first_seed + part.start)
-        self._step, self._part = stepper(self._task), part
+        self._step, self._part = self._task.advance, part
         self._everywhere = np.ones(len(part.env_ids), bool)
         self._over = ~self._everywhere  # begin anew at the next step
         self._rows: Arrays = {}
@@ -176,9 +176,10 @@ class Batch:
         which = slice(None) if ids is None else ids
         for name, value in _named(obs, info):
             if name not in self._rows:
+                task = self._task.task_class.__name__
                 raise TaskError(
-                    f"{name!r} was not there at the first reset of {type(self._task).__name__};"
-                    " evaluate() and observe() must always return the same keys"
+                    f"{name!r} was not there at the first reset of {task}; evaluate() and observe()"
+                    " must always return the same keys"
                 )
             self._rows[name][which] = value[which]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import gymnasium
@@ -14,7 +14,6 @@ from robots import TaskError
 from tasks.engine.arguments import RECONFIGURE, SEED, SUCCESS, checked_seeds, own_options
 from tasks.engine.observation import observed_dtype, space_of
 from tasks.engine.remade import Remade
-from tasks.engine.task import MultiRobotTask
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import make
 
@@ -33,7 +32,7 @@ class OneEnvironment(Remade):
         """Make the task; returns how many control steps a second has, to the next integer."""
         self.task = make(task_id, render_mode=render_mode, **fields)
         self.render_mode = render_mode
-        self._step = stepper(self.task)
+        self._step = self.task.advance
         self._first = FirstSeeds(1)
         self._seed = self.task.seeds[0]
         return round(self.task.scenario.control_frequency)
@@ -106,7 +105,7 @@ class GymnasiumTask(OneEnvironment, gymnasium.Env[Any, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin a new episode; see `tasks.MultiRobotTask.reset`.
+        """Begin a new episode; see `tasks.TaskEnv.reset`.
 
         Args:
             seed: Seed of the episode; None lets the random streams run on, from entropy.
@@ -137,11 +136,6 @@ class GymnasiumTask(OneEnvironment, gymnasium.Env[Any, NDArray[np.float32]]):
 
 
 # -- what a task returns, as arrays and numbers ---------------------------------------------------
-
-
-def stepper(task: MultiRobotTask) -> Callable[..., Any]:
-    """Return what steps a task without making tensors, unless its class has a step of its own."""
-    return task.advance if type(task).step is MultiRobotTask.step else task.step
 
 
 def as_array(value: Any) -> NDArray[Any]:

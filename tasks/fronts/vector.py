@@ -19,6 +19,7 @@ from robots import SimulationError, TaskError, UnknownNameError, unknown_name_me
 from robots.common.bounds import checked_whole
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
+from tasks.engine.env import built_layout
 from tasks.engine.observation import space_of
 from tasks.engine.remade import Remade
 from tasks.fronts.batch import Part
@@ -130,7 +131,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self.autoreset_mode = mode
         frames = round(scenario.control_frequency)
         self.metadata = {**self.metadata, "autoreset_mode": mode, "render_fps": frames}  # type: ignore[misc]
-        layout = cls.built_layout(scenario)
+        layout = built_layout(cls, scenario)
         self.action_split = layout.action_split
         self._reader = ActionReader(layout, num_envs)
         self._seeds = [cls.first_seed + i for i in range(num_envs)]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
 
 from layouts import Layout, Placement
 from robots import RobotRegistry, SimulationError
@@ -115,22 +113,18 @@ class DrawTriangle(Clone):
             "dots_used": state.full(0),
         }
 
-    def step(
-        self, action: Any, env_ids: Sequence[int] | None = None
-    ) -> tuple[Any, Any, Any, Any, Info]:
-        """Advance by one control step; see `MultiRobotTask.step`.
+    def begin_step(self) -> None:
+        """Refuse to go on without dots.
 
         Raises:
             SimulationError: If an environment has used all its dots up; nothing moves then.
         """
-        moving = range(self.num_envs) if env_ids is None else env_ids
         used = self.memory.dots_used.tolist()
-        if empty := [i for i in moving if used[i] >= MAX_DOTS]:
+        if empty := [i for i in self.moving if used[i] >= MAX_DOTS]:
             raise SimulationError(
                 f"environments {empty} have used up their {MAX_DOTS} dots, one per step;"
                 f" reset them: reset(env_ids={empty})"
             )
-        return super().step(action, env_ids)
 
     def respond(self, state: State) -> None:
         """Leave a dot under every stick that is low enough, and hide a dot for every other."""

@@ -14,7 +14,7 @@ from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
 from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
 from rollouts.receipts import Receipt
-from rollouts.receipts.sources import describe_task
+from rollouts.receipts.provenance import describe_task
 from tasks import get_task_class
 
 ROOT = DOCS.parent

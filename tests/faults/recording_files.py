@@ -16,7 +16,7 @@ import numpy as np
 if TYPE_CHECKING:
     from rollouts.reading.recording import Trajectory
     from rollouts.recording.recorder import Recorder
-    from tasks import MultiRobotTask
+    from tasks import TaskEnv
 
 AREA = "recordings"
 TASK, ACTIONS, LENGTHS, SEEDS = "PushT-v1", 7, (3, 4, 5), (10, 11, 12)
@@ -25,7 +25,7 @@ SECRET = b"root:x:0:0:the secret of another file:/root:/bin/sh\n" * 40
 
 
 @functools.cache
-def task() -> MultiRobotTask:
+def task() -> TaskEnv:
     """Return the task that was recorded."""
     import tasks
 

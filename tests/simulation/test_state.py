@@ -8,19 +8,19 @@ from robots import SimulationError, UnknownNameError
 from simulation import Simulation, State
 from simulation.checks.overlaps import empty, stand
 from simulation.sapien3.backend import worlds_below
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 
 @pytest.fixture
-def env() -> MultiRobotTask:
+def env() -> TaskEnv:
     return tasks.make("TwoRobotPickCube-v1", num_envs=2, robots={"right": "panda_stick"})
 
 
-def state_of(env: MultiRobotTask) -> State:
+def state_of(env: TaskEnv) -> State:
     return env.simulation.read()
 
 
-def test_gripper_opening_is_a_share_of_its_range(env: MultiRobotTask):
+def test_gripper_opening_is_a_share_of_its_range(env: TaskEnv):
     env.reset(seed=0)
     assert state_of(env).gripper_opening("left").tolist() == [1.0, 1.0]
     action = torch.zeros(2, 15)
@@ -31,7 +31,7 @@ def test_gripper_opening_is_a_share_of_its_range(env: MultiRobotTask):
     np.testing.assert_allclose(opening, [0.015 / 0.04, 1.0], atol=5e-3)
 
 
-def test_a_robot_without_a_gripper_is_open(env: MultiRobotTask):
+def test_a_robot_without_a_gripper_is_open(env: TaskEnv):
     assert state_of(env).gripper_opening("right").tolist() == [1.0, 1.0]
     with pytest.raises(UnknownNameError, match="Did you mean 'right'"):
         state_of(env).gripper_opening("rigth")
@@ -43,13 +43,13 @@ def test_joints_that_are_held_are_no_gripper():
     np.testing.assert_allclose(fetch.read().gripper_opening("arm"), [0.3])
 
 
-def test_base_positions_are_where_the_layout_says(env: MultiRobotTask):
+def test_base_positions_are_where_the_layout_says(env: TaskEnv):
     state = state_of(env)
     for name, y in (("left", -0.75), ("right", 0.75)):
         np.testing.assert_allclose(state.base_position(name), [[0.0, y, 0.0]] * 2, atol=1e-6)
 
 
-def test_speed_and_spin_are_norms(env: MultiRobotTask):
+def test_speed_and_spin_are_norms(env: TaskEnv):
     for world in worlds_below(env.simulation):
         world.bodies["cube"].component.set_linear_velocity([0.3, 0.0, 0.4])
         world.bodies["cube"].component.set_angular_velocity([0.0, 2.0, 0.0])
@@ -59,7 +59,7 @@ def test_speed_and_spin_are_norms(env: MultiRobotTask):
     np.testing.assert_allclose(state.spin("cube"), [2.0, 2.0], rtol=1e-6)
 
 
-def test_velocities_are_those_of_the_body_asked_for(env: MultiRobotTask):
+def test_velocities_are_those_of_the_body_asked_for(env: TaskEnv):
     for world in worlds_below(env.simulation):
         world.bodies["cube"].component.set_linear_velocity([0.0, 0.0, 4.0])
         world.bodies["cube"].component.set_angular_velocity([0.0, 2.0, 0.0])
@@ -76,7 +76,7 @@ def test_velocities_are_those_of_the_body_asked_for(env: MultiRobotTask):
     assert state_of(env).linear_velocity("cube").tolist() == [[0.0, 0.0, 4.0]] * 2
 
 
-def test_velocities_are_read_while_the_state_is_present(env: MultiRobotTask):
+def test_velocities_are_read_while_the_state_is_present(env: TaskEnv):
     read, unread = state_of(env), state_of(env)
     before = read.linear_velocity("cube").tolist()
     env.step(torch.zeros(2, 15))
@@ -85,14 +85,14 @@ def test_velocities_are_read_while_the_state_is_present(env: MultiRobotTask):
         unread.linear_velocity("cube")
 
 
-def test_a_remembered_answer_is_that_of_the_same_question(env: MultiRobotTask):
+def test_a_remembered_answer_is_that_of_the_same_question(env: TaskEnv):
     env.step(torch.ones(2, 15))
     state = state_of(env)
     assert not state.is_static("left", threshold=0.0).any()
     assert state.is_static("left", threshold=100.0).all()
 
 
-def test_contacts_of_unknown_names_are_refused_where_nothing_touches(env: MultiRobotTask):
+def test_contacts_of_unknown_names_are_refused_where_nothing_touches(env: TaskEnv):
     state = state_of(env)
     with pytest.raises(UnknownNameError, match="Did you mean 'cube'"):
         state.is_grasping("left", "cub")

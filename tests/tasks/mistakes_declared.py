@@ -175,12 +175,19 @@ MISTAKES = (
         "Tray.cube is the class Cube; a body is one that it makes: cube = Cube(…)",
     ),
     Mistake(
-        "a body called as a method",
-        dict(reset=Cube(0.02)),
+        "a body called as what every task has",
+        dict(memory=Cube(0.02)),
         (
-            "Tray.reset is a body, but 'reset' is a name that every task has for something else; "
+            "Tray.memory is a body, but 'memory' is a name that every task has for something else; "
             "call it something else"
         ),
+    ),
+    Mistake(
+        "a step of its own",
+        dict(step=lambda self, action: None),
+        "Tray defines step, which nothing calls: tasks are stepped by tasks.TaskEnv, and define "
+        "design, build, sample, evaluate, observe, dense_reward, remember, begin_episodes, "
+        "begin_step, respond, reset_robots",
     ),
     Mistake(
         "a body called table",

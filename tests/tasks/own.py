@@ -3,19 +3,19 @@
 import torch
 
 import tasks
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
-def make(task_id: str, **fields: object) -> MultiRobotTask:
+def make(task_id: str, **fields: object) -> TaskEnv:
     """Make a task and begin an episode."""
     env = tasks.make(task_id, **fields)
     env.reset(seed=0)
     return env
 
 
-def put(env: MultiRobotTask, **poses: tuple[float, ...]) -> dict[str, torch.Tensor]:
+def put(env: TaskEnv, **poses: tuple[float, ...]) -> dict[str, torch.Tensor]:
     """Put bodies at poses (m, wxyz; turned upright if left out), at rest, and return the info."""
     state = env.get_state_dict()
     for body, pose in poses.items():
@@ -26,7 +26,7 @@ def put(env: MultiRobotTask, **poses: tuple[float, ...]) -> dict[str, torch.Tens
     return look(env)
 
 
-def look(env: MultiRobotTask) -> dict[str, torch.Tensor]:
+def look(env: TaskEnv) -> dict[str, torch.Tensor]:
     """Return what the present state is judged as, without a step."""
     told = env.evaluate(env.simulation.read())
     return {key: torch.as_tensor(value) for key, value in told.items()}

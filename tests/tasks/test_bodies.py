@@ -2,12 +2,14 @@
 
 import math
 
+import numpy as np
 import pytest
 
+import tasks
 from robots import SimulationError, TaskError
 from simulation import Box, Friction, Sphere
 from simulation.scene.shapes import Finish
-from tasks.language.bodies import Ball, Compound, Cube, Cuboid, Peg
+from tasks.language.bodies import Area, Ball, Compound, Cube, Cuboid, Peg
 
 
 @pytest.mark.parametrize(
@@ -62,3 +64,13 @@ def test_colour_and_matter_reach_the_shapes():
         (shape,) = body.shapes
         assert (shape.color, shape.density, shape.friction) == (blue, 500.0, rough)
     assert Cube(0.1).shapes == Cuboid([0.1, 0.1, 0.1]).shapes
+
+
+def test_a_body_may_have_a_name_that_what_steps_the_task_uses_itself():
+    class Named(tasks.get_task_class("PickCube-v1")):
+        state, step, seeds = (Cube(0.02, spawn=Area(x=0.1, y=0.1)) for _ in range(3))
+
+    env = Named(Named.scenario)
+    assert {"state", "step", "seeds"} < set(env.bodies)
+    assert env.step(np.zeros((1, 8)))[0].shape[0] == 1
+    assert env.task.seeds is Named.bodies["seeds"]

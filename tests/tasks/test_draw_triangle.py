@@ -3,15 +3,14 @@ import torch
 
 import tasks
 from robots import SimulationError
-from tasks import MultiRobotTask
-from tasks.fronts.gymnasium import stepper
+from tasks import TaskEnv
 from tasks.maniskill.draw_triangle import MAX_DOTS
 
 STILL = torch.zeros(1, 7)
 DOWN = torch.tensor([[0.0, 1.0, 0.0, -0.4, 0.0, 0.0, 0.0]])  # until the stick presses the canvas
 
 
-def drawn(env: MultiRobotTask, index: int = 0) -> list[str]:
+def drawn(env: TaskEnv, index: int = 0) -> list[str]:
     actors = env.get_state_dict()["actors"]
     return [name for name, rows in actors.items() if name[:3] == "dot" and rows[index, 2] > 0]
 
@@ -68,10 +67,3 @@ def test_only_the_sparse_reward_is_offered_as_in_native():
     assert tasks.get_task_class("DrawTriangle-v1").reward_modes == ("sparse",)
     with pytest.raises(ValueError, match="reward_mode 'none' is not offered"):
         tasks.make("DrawTriangle-v1", reward_mode="none")
-
-
-def test_fronts_take_the_step_of_its_own():
-    env = tasks.make("DrawTriangle-v1")
-    assert stepper(env) == env.step
-    other = tasks.make("PickCube-v1")
-    assert stepper(other) == other.advance

@@ -4,19 +4,19 @@ import torch
 
 import tasks
 from robots import SimulationError, TaskError
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tests.quick import quick_cases
 
 ALL = tasks.list_tasks()
 
 
-def actions(env: MultiRobotTask, count: int, seed: int = 0) -> torch.Tensor:
+def actions(env: TaskEnv, count: int, seed: int = 0) -> torch.Tensor:
     rng = np.random.RandomState(seed)
     shape = (count, *env.action_space.shape)
     return torch.from_numpy(rng.uniform(-1, 1, shape).astype(np.float32))
 
 
-def play(env: MultiRobotTask, seed: object, steps: torch.Tensor) -> list[torch.Tensor]:
+def play(env: TaskEnv, seed: object, steps: torch.Tensor) -> list[torch.Tensor]:
     observations = [env.reset(seed=seed, options={"reconfigure": True})[0]]
     return observations + [env.step(action)[0] for action in steps]
 

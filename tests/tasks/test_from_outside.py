@@ -101,8 +101,8 @@ def test_a_module_and_an_id_go_wherever_an_id_goes(mylab):
         "assert 'mylab.tray' not in sys.modules\n"
         "env = tasks.make('mylab.tray:twoarmtray-v1', num_envs=2)\n"
         "print(env.task_id, env.num_envs, 'TwoArmTray-v1' in tasks.list_tasks())\n"
-        "assert tasks.get_task_class('mylab.tray:TRAY') is type(env)\n"
-        "assert tasks.get_task_class('TwoArmTray-v1') is type(env)\n"
+        "assert tasks.get_task_class('mylab.tray:TRAY') is env.task_class\n"
+        "assert tasks.get_task_class('TwoArmTray-v1') is env.task_class\n"
         "try: tasks.make('mylab.tray:TwoArmTry-v1')\n"
         "except KeyError as error: print(error)\n"
     )

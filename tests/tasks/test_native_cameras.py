@@ -104,7 +104,7 @@ def test_another_camera_is_noticed(pick: Look, mutant: Camera, part: str):
 
 @pytest.mark.parametrize("what", ["light", "markers", "colour", "privileged"])
 def test_another_scene_is_noticed(pick: Look, what: str, monkeypatch: pytest.MonkeyPatch):
-    from simulation.sapien3 import studio as rendering
+    from simulation.sapien3.pictures import studio as rendering
 
     part = "sensor_data/base_camera/rgb"
     if what == "light":

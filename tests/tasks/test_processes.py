@@ -375,7 +375,7 @@ def test_a_copy_is_made_alike_and_is_another(front, make_copy):
     makers = {**FRONTS, "workers": lambda: VectorTask(TASK, 2, num_workers=2)}
     with closing(makers[front]()) as env:
         with closing(make_copy(env)) as other:
-            assert type(other) is type(env)
+            assert type(other) is env.task_class
             theirs = pickle.dumps(begin(other))
         assert pickle.dumps(begin(env)) == theirs
 

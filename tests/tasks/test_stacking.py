@@ -4,12 +4,12 @@ import torch
 
 import tasks
 from simulation.sapien3.backend import worlds_below
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 
 HALF = 0.02
 
 
-def put(env: MultiRobotTask, **places: tuple[float, float, float]) -> dict[str, np.ndarray]:
+def put(env: TaskEnv, **places: tuple[float, float, float]) -> dict[str, np.ndarray]:
     """Put bodies somewhere and return what the task tells of them."""
     for name, position in places.items():
         env.simulation.worlds[0].set_pose(name, position)

@@ -11,19 +11,19 @@ import tasks
 from robots import TaskError, UnknownNameError
 from simulation.sapien3.backend import worlds_below
 from simulation.scene.parts import Part
-from tasks import Camera, Distractors, Light, MultiRobotTask, Randomization, Uniform, Whole
+from tasks import Camera, Distractors, Light, Randomization, TaskEnv, Uniform, Whole
 
 NAMES = [f"distractor_{i}" for i in range(4)]
 SOME = Distractors(count=Whole(0, 4))
 ALL = Distractors(count=Whole(4, 4))
 
 
-def made(distractors: Distractors | None, num_envs: int = 1, **options: Any) -> MultiRobotTask:
+def made(distractors: Distractors | None, num_envs: int = 1, **options: Any) -> TaskEnv:
     randomization = Randomization(distractors=distractors)
     return tasks.make("PickCube-v1", num_envs, randomization=randomization, **options)
 
 
-def drawn(env: MultiRobotTask, i: int = 0) -> dict[str, Any]:
+def drawn(env: TaskEnv, i: int = 0) -> dict[str, Any]:
     about = env.drawn(i)
     assert about is not None
     return about["distractors"]

@@ -14,9 +14,9 @@ from tasks import (
     Camera,
     CameraShift,
     Light,
-    MultiRobotTask,
     Randomization,
     Surface,
+    TaskEnv,
     Texture,
     Uniform,
     Whole,
@@ -36,22 +36,22 @@ EVERYTHING = Randomization(
 Picture = np.ndarray
 
 
-def made(randomization: Randomization | None, num_envs: int = 1, **options: Any) -> MultiRobotTask:
+def made(randomization: Randomization | None, num_envs: int = 1, **options: Any) -> TaskEnv:
     options = {"obs_mode": "rgb+segmentation", "cameras": [CAMERA], **options}
     return tasks.make("PickCube-v1", num_envs, randomization=randomization, **options)
 
 
-def seen(env: MultiRobotTask, seed: int = 0, texture: str = "rgb") -> Picture:
+def seen(env: TaskEnv, seed: int = 0, texture: str = "rgb") -> Picture:
     obs, _ = env.reset(seed=seed)
     return obs["sensor_data"]["base_camera"][texture].numpy()
 
 
 @pytest.fixture(scope="module")
-def plain(renderer: None) -> MultiRobotTask:
+def plain(renderer: None) -> TaskEnv:
     return made(None)
 
 
-def of_body(env: MultiRobotTask, seed: int, body: str) -> Picture:
+def of_body(env: TaskEnv, seed: int, body: str) -> Picture:
     """Return the pixels of a body, (K, 3)."""
     number = worlds_below(env.simulation)[0].bodies[body].entity.per_scene_id
     obs, _ = env.reset(seed=seed)
@@ -60,7 +60,7 @@ def of_body(env: MultiRobotTask, seed: int, body: str) -> Picture:
 
 
 @drawing
-def test_a_camera_is_moved_turned_and_widened(plain: MultiRobotTask) -> None:
+def test_a_camera_is_moved_turned_and_widened(plain: TaskEnv) -> None:
     env = made(
         Randomization(cameras={"base_camera": CameraShift(x=0.1, y=-0.05, yaw=0.2, fov=0.5)})
     )
@@ -94,7 +94,7 @@ def test_a_robots_camera_goes_by_the_robots_place() -> None:
 
 @drawing
 @pytest.mark.parametrize("light", ["side", "top", "ambient"])
-def test_a_light_grows_weaker(plain: MultiRobotTask, light: str) -> None:
+def test_a_light_grows_weaker(plain: TaskEnv, light: str) -> None:
     env = made(Randomization(lights={light: Light(strength=0.3, red=0.0)}))
     before, after = (seen(e)[0].astype(float) for e in (plain, env))
     dimmer = before.mean((0, 1)) - after.mean((0, 1))
@@ -103,7 +103,7 @@ def test_a_light_grows_weaker(plain: MultiRobotTask, light: str) -> None:
 
 
 @drawing
-def test_light_from_elsewhere_falls_on_other_sides(plain: MultiRobotTask) -> None:
+def test_light_from_elsewhere_falls_on_other_sides(plain: TaskEnv) -> None:
     """The side of the cube that faces the camera is dark until the lamp stands behind that."""
     dark = Randomization(lights={"top": Light(strength=0), "ambient": Light(strength=0.1)})
     turned = Randomization(lights={**dark.lights, "side": Light(turn=Uniform(2.3, 2.4), tilt=0.3)})
@@ -113,7 +113,7 @@ def test_light_from_elsewhere_falls_on_other_sides(plain: MultiRobotTask) -> Non
 
 
 @drawing
-def test_paint_is_seen_on_what_is_painted_alone(plain: MultiRobotTask) -> None:
+def test_paint_is_seen_on_what_is_painted_alone(plain: TaskEnv) -> None:
     env = made(Randomization(colors={"cube": Surface(red=0.0, green=0.0, blue=1.0)}))
     own, painted = of_body(plain, 0, "cube"), of_body(env, 0, "cube")
     assert len(own) == len(painted) > 5
@@ -133,7 +133,7 @@ def test_some_paint_leaves_some_of_the_own_colour() -> None:
 
 @drawing
 @pytest.mark.parametrize("kind", ["checker", "stripes", "noise", "wood"])
-def test_a_pattern_covers_a_body_in_two_colours(plain: MultiRobotTask, kind: str) -> None:
+def test_a_pattern_covers_a_body_in_two_colours(plain: TaskEnv, kind: str) -> None:
     texture = Texture(kinds=[kind], cells=Whole(2, 2))
     env = made(Randomization(textures={"table-workspace": texture}))
     table = of_body(env, 0, "table-workspace").astype(float)

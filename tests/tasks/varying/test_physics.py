@@ -9,7 +9,7 @@ import torch
 
 import tasks
 from simulation.sapien3.backend import worlds_below
-from tasks import Fixed, MultiRobotTask, Normal, Randomization, Shift, Whole
+from tasks import Fixed, Normal, Randomization, Shift, TaskEnv, Whole
 
 TASK = "PickCube-v1"
 ARM_MOVES = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0, 0]])
@@ -19,17 +19,17 @@ HALF = 0.02  # m, of the cube
 TIMESTEP = 0.01  # s
 
 
-def made(randomization: Randomization | None = None, **making: Any) -> MultiRobotTask:
+def made(randomization: Randomization | None = None, **making: Any) -> TaskEnv:
     env = tasks.make(TASK, randomization=randomization, **making)
     env.reset(seed=0)
     return env
 
 
-def cube_of(env: MultiRobotTask) -> Any:
+def cube_of(env: TaskEnv) -> Any:
     return worlds_below(env.simulation)[0].bodies["cube"]
 
 
-def throw(env: MultiRobotTask, position: tuple[float, float, float], velocity: float) -> None:
+def throw(env: TaskEnv, position: tuple[float, float, float], velocity: float) -> None:
     """Put the cube somewhere, moving along y (m/s)."""
     state = env.get_state_dict()
     row = [*position, 1.0, 0.0, 0.0, 0.0, 0.0, velocity, 0.0, 0.0, 0.0, 0.0]
@@ -37,7 +37,7 @@ def throw(env: MultiRobotTask, position: tuple[float, float, float], velocity: f
     env.set_state_dict(state)
 
 
-def cube_place(env: MultiRobotTask) -> Any:
+def cube_place(env: TaskEnv) -> Any:
     return env.simulation.read().pose("cube")[0, :3]
 
 
@@ -154,7 +154,7 @@ def test_bases_stand_where_they_were_drawn() -> None:
     np.testing.assert_allclose(solver.forward(qpos)[0], expected, atol=1e-5)
 
 
-def played(env: MultiRobotTask, steps: int) -> tuple[list[Any], list[Any]]:
+def played(env: TaskEnv, steps: int) -> tuple[list[Any], list[Any]]:
     """Return observations and joint positions of some steps."""
     rng = np.random.default_rng(0)
     seen, joints = [env.reset(seed=0)[0]], [env.simulation.read().qpos("arm").copy()]

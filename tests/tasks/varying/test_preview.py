@@ -8,7 +8,7 @@ from PIL import Image
 
 import tasks
 from robots import RobotLayoutsError, UnknownNameError
-from tasks import Camera, CameraShift, Light, MultiRobotTask, Randomization, Uniform
+from tasks import Camera, CameraShift, Light, Randomization, TaskEnv, Uniform
 from tasks.__main__ import main
 from tasks.preview import draws, save
 
@@ -18,7 +18,7 @@ DIM = {"*": Light(strength=Uniform(0.2, 1.0))}
 CAMERA = Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1), width=64, height=32)
 
 
-def made(randomization: Randomization | None = None) -> MultiRobotTask:
+def made(randomization: Randomization | None = None) -> TaskEnv:
     return tasks.make(
         "PickCube-v1",
         render_mode="rgb_array",

@@ -10,17 +10,17 @@ import torch
 
 import tasks
 from simulation.sapien3.backend import worlds_below
-from tasks import LogUniform, MultiRobotTask, Randomization, Uniform
+from tasks import LogUniform, Randomization, TaskEnv, Uniform
 from tests.tasks.varying.declarations import IN_PLACE, TASK, VARIED
 
 REBUILT = {"reconfigure": True}
 
 
-def made(randomization: Randomization | None, num_envs: int = 1) -> MultiRobotTask:
+def made(randomization: Randomization | None, num_envs: int = 1) -> TaskEnv:
     return tasks.make(TASK, num_envs, randomization=randomization)
 
 
-def digest(env: MultiRobotTask, steps: int = 8) -> list[str]:
+def digest(env: TaskEnv, steps: int = 8) -> list[str]:
     """Play random actions and return a hash of each environment's states and observations."""
     rng, hashes = np.random.default_rng(0), [hashlib.sha256() for _ in range(env.num_envs)]
     width = env.single_action_space.shape[0]
@@ -110,7 +110,7 @@ def test_another_target_leaves_the_draws_of_the_others() -> None:
     assert set(other["mass"]) == {"cube", "left", "right"}
 
 
-def physical(env: MultiRobotTask) -> dict[str, Any]:
+def physical(env: TaskEnv) -> dict[str, Any]:
     """Return the numbers of a world that may be varied, as SAPIEN has them."""
     (world,) = worlds_below(env.simulation)
     numbers: dict[str, Any] = {}
