@@ -10,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
+import sys
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -34,6 +35,11 @@ AnyText = Annotated[str, Meta(description="a text")]
 Name = Annotated[
     str, Meta(min_length=1, max_length=200, description="a text of 1 to 200 characters")
 ]
+Finite = Annotated[
+    float,
+    Meta(ge=-sys.float_info.max, le=sys.float_info.max, description="a finite number"),
+]
+"""Of double precision, as files hold what no world computes with."""
 Object = dict[str, Any]
 Digest = Annotated[
     str, Meta(pattern="^[0-9a-f]{64}\\Z", description="a SHA-256: 64 of the digits 0-9 and a-f")
@@ -181,8 +187,8 @@ def _strict(hint: Any) -> Any:
 def _strict_annotated(hint: Any, plain: Any, meta: Meta) -> Any:
     if plain not in (int, float):
         return hint if plain is str else Annotated[_strict(plain), meta]
-    least = None if meta.ge is None else math.ceil(meta.ge)
-    most = None if meta.le is None else math.floor(meta.le)
+    least = -(2**63) if meta.ge is None else max(-(2**63), math.ceil(meta.ge))
+    most = 2**63 - 1 if meta.le is None else min(2**63 - 1, math.floor(meta.le))
     whole_number = Annotated[int, Meta(ge=least, le=most)]
     return whole_number if plain is int else whole_number | hint
 

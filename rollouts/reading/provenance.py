@@ -20,7 +20,7 @@ from typing_extensions import NotRequired, TypedDict
 from layouts import Layout
 from robots import CONTROL_MODES, JointGroup
 from robots.common.files import parse_json
-from robots.common.schema import AnyText, FieldError, Name, Object, check, length, whole
+from robots.common.schema import AnyText, FieldError, Finite, Name, Object, check, length, whole
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_fingerprint
 from rollouts.reading.guessed_robots import describe_guessed
@@ -35,19 +35,19 @@ _ACTION_NUMBERS = 10_000  # of all robots
 # What `describe_layout` and `describe_simulation` write, as far as it is read again.
 class _Place(TypedDict):
     robot: Name
-    position: Annotated[list[float], length(3)]
-    quaternion: Annotated[list[float], length(4)]
+    position: Annotated[list[Finite], length(3)]
+    quaternion: Annotated[list[Finite], length(4)]
     keyframe: Name | None
-    qpos_noise: float | None
+    qpos_noise: Finite | None
     action: Annotated[list[Annotated[int, whole(0, _ACTION_NUMBERS)]], length(2)]
-    start_qpos: NotRequired[list[float]]
+    start_qpos: NotRequired[list[Finite]]
     joint_groups: NotRequired[Object]
     assets: NotRequired[AnyText]
 
 
 class _Simulation(TypedDict, total=False):
     physics: Object | None
-    control_frequency: float
+    control_frequency: Finite
     randomization: Object
 
 

@@ -11,7 +11,7 @@ from typing_extensions import NotRequired, TypedDict
 
 from robots import CONTROL_MODES, RobotLayoutsError, UnreadableFileError
 from robots.common.files import read_json
-from robots.common.schema import AnyText, FieldError, Name, Object, check, whole
+from robots.common.schema import AnyText, FieldError, Finite, Name, Object, check, whole
 
 MAX_JSON = 2**28  # bytes; some 600,000 episodes
 MAX_STEPS = 10**6  # of an episode; fourteen hours at 20 Hz
@@ -43,7 +43,7 @@ class _Source(TypedDict):
 class _Played(TypedDict, total=False):
     control_mode: _Mode | None
     reset_kwargs: _Reset | None
-    success: bool | float | None
+    success: bool | Finite | None
     source: _Source | None
     drawn: Object | None
     reason: AnyText | None

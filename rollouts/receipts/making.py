@@ -12,7 +12,7 @@ from typing_extensions import NotRequired, TypedDict
 from layouts import Layout
 from layouts.placement import RobotLike
 from robots import RobotLayoutsError
-from robots.common.schema import FieldError, Name, Object, check, length, whole
+from robots.common.schema import FieldError, Finite, Name, Object, check, length, whole
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_checksums
 from rollouts.reading.guessed_robots import GUESSED, descriptor_digest
@@ -32,7 +32,7 @@ class _Making(TypedDict):
     obs_mode: Name
     reward_mode: Name
     control_mode: Name | dict[str, Name] | None
-    control_frequency: float
+    control_frequency: Finite
     max_episode_steps: Annotated[int, whole(1, 2**31 - 1)]
     physics: Object | None
     randomization: Object | None

@@ -20,7 +20,17 @@ from typing_extensions import NotRequired, TypedDict
 
 from robots import RobotLayoutsError, UnreadableFileError
 from robots.common.files import read_json
-from robots.common.schema import AnyText, Digest, FieldError, Name, Object, check, exactly, whole
+from robots.common.schema import (
+    AnyText,
+    Digest,
+    FieldError,
+    Finite,
+    Name,
+    Object,
+    check,
+    exactly,
+    whole,
+)
 from robots.common.writing import write_whole
 from rollouts.playing.state_trace import BYTES
 from rollouts.reading.summary import MAX_SEED, MAX_STEPS
@@ -54,7 +64,7 @@ class _Episode(TypedDict):
     seed: Annotated[int, whole(0, MAX_SEED)]
     success: bool
     steps: Annotated[int, whole(0, MAX_STEPS)]
-    total: float
+    total: Finite
     states: Digest
     trace: AnyText
     reason: NotRequired[AnyText]
