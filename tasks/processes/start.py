@@ -20,6 +20,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from importlib import reload
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.process import BaseProcess
+from multiprocessing.spawn import get_preparation_data
 from queue import SimpleQueue
 from threading import RLock, Thread
 from typing import Any, TypeAlias
@@ -111,10 +112,17 @@ def end_with_parent() -> None:
 
 def _start(work: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProcess:
     """Start a process, in the thread that starts all of them."""
+    global _server_is_inherited
     _expect_descriptors()
+    try:
+        get_preparation_data("worker")
+    except RuntimeError:  # of a process that is still importing its main module
+        raise ProcessError(
+            "this script starts workers when it is imported, which every worker does; put what it"
+            " runs under `if __name__ == '__main__':`"
+        ) from None
     resource_tracker.ensure_running()  # unblocks SIGINT, so it comes first
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # so do those that this one starts
-    global _server_is_inherited
     if _server_is_inherited:  # a fork cannot use the server of its parent
         reload(forkserver)
         _server_is_inherited = False
@@ -133,11 +141,6 @@ def _start(work: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProcess
     except EOFError:
         raise ProcessError(
             "the process that forks workers ended, for the reason that it printed"
-        ) from None
-    except RuntimeError:  # of a process that is still importing its main module
-        raise ProcessError(
-            "this script starts workers when it is imported, which every worker does; put what it"
-            " runs under `if __name__ == '__main__':`"
         ) from None
     return process
 
