@@ -39,7 +39,7 @@ from robots import RobotDescriptor, RobotLayoutsError, RobotRegistry, TaskError
 from robots.common.writing import write_whole
 from robots.urdf.tcp import find_tcp
 from simulation import State, World
-from tasks import EpisodeRandom, MultiRobotTask
+from tasks import EpisodeRandom, MultiRobotTask, TaskEnv
 
 MODE = "pd_joint_pos"  # control mode
 CLEARANCE = 0.02  # m; how far robots are asked to stay apart
@@ -282,7 +282,7 @@ class Place:
         self.postures = RandomPostures(self.cell, CLEARANCE)
 
     @cached_property
-    def task(self) -> FreeRobots:
+    def task(self) -> TaskEnv:
         """Where motions are carried out."""
         layout = self.cell.layout
         scenario = replace(FreeRobots.scenario, layout=layout, control_mode=MODE)
@@ -296,9 +296,7 @@ class Place:
         ``stray`` is how far any link was from the plan (m), ``late`` how much longer it took (s).
         """
         task, touching = self.task, dict[str, None]()
-        task.task.starts = {  # pyright: ignore[reportAttributeAccessIssue]
-            name: rows[0] for name, rows in motion.positions.items()
-        }
+        vars(task.task)["starts"] = {name: rows[0] for name, rows in motion.positions.items()}
         task.reset(0)
 
         def watch() -> None:

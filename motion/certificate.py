@@ -16,7 +16,7 @@ from motion.collision.cell import Cell, cell_of
 from motion.collision.checker import Checker
 from motion.collision.continuous import Curve, check_along
 from motion.model.hermite import hermite_extremes
-from motion.timing.velocities import velocities
+from motion.timing import velocities
 from robots.common.bounds import FAR, checked_number
 from robots.common.errors import MotionError
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Annotated
 
 from layouts.commands import LayoutWords, Page
-from motion import planning
 from motion.model.obstacles import Obstacle, box
 from motion.motion import Motion
+from motion.planning import plan as planning
 from motion.planning.goals import Goal, TcpGoal
 from robots.common.cli import Corners, File, Word, by_name
 from robots.common.commands import FAILED

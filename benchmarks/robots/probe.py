@@ -156,7 +156,7 @@ def _agreement(robot: RobotDescriptor) -> Seen:
         both += len(found.keys() & seen.keys())
         physics += sum(seen[pair] > TOUCH for pair in seen.keys() - found.keys())
         for pair in found.keys() - seen.keys():
-            standing = stand_hulls(NAME, Placement(robot), model, qpos[None])
+            standing = stand_hulls(NAME, Placement(robot).base_pose, model, qpos[None])
             approach = nearest(standing, standing, found[pair])
             checks += approach is not None and -approach.distance > TOUCH
     return {"both": both, "physics": physics, "checks": checks}

@@ -13,7 +13,7 @@ from motion.collision.checker import Checker
 from motion.model.bodies import Solid
 from motion.model.obstacles import Held
 from motion.output.protocol import TimedMotion
-from motion.timing.velocities import velocities
+from motion.timing import velocities
 from robots.urdf.tcp import find_tcp
 
 

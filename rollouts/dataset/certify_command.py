@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from robots import TaskError
 from robots.common.cli import Word
 from robots.common.commands import printable
-from rollouts.playing.command_options import GOES_ON, Players, Recording, stoppable
+from rollouts.playing.command_options import GOES_ON, Players, RecordingOption, stoppable
 
 if TYPE_CHECKING:
     from robots.common.progress import Progress
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def certify(
-    recording: Recording,
+    recording: RecordingOption,
     *,
     players: Players,
     out: Annotated[Path, Word("JSON")] | None = None,
