@@ -57,7 +57,7 @@ class Wanted:
             in each further reward mode.
         seeds: Reset seeds 0 … N-1.
         steps: Control steps of a random episode.
-        actions: Play this .h5 or .npz file instead.
+        actions: Play this recording (.h5) instead.
         demos: Play the demonstrations below this folder as well.
         history: fresh rebuilds both scenes before every episode, reused only resets them (fresh).
         reward_mode: Reward modes, or 'all' (the task's default one).

@@ -30,7 +30,7 @@ def replay(
     Args:
         task: Task id or another of its names, such as pick_cube.
         episodes: Play the first N episodes.
-        demo: Recording to play (.h5 or .npz); else the task's official one in $MS_ASSET_DIR/demos,
+        demo: Recording to play (.h5); else the task's official one in $MS_ASSET_DIR/demos,
             else N episodes by its expert, recorded into --out first.
         out: Folder for recorded episodes.
 

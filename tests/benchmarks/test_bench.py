@@ -137,7 +137,9 @@ QUICK = ("reset", "step", "validation")  # the others start processes, draw, or 
 
 
 @pytest.mark.parametrize("name", quick_cases(BENCHMARKS, QUICK))
-def test_every_benchmark_measures(name):
+def test_every_benchmark_measures(name, request):
+    if name in ("looks", "pictures"):
+        request.getfixturevalue("renderer")  # the one with which native draws later, too
     shares = []
     found = BENCHMARKS[name](replace(TINY, tick=shares.append))
     assert found.name == name
@@ -152,7 +154,7 @@ def test_every_benchmark_measures(name):
 
 
 class TestBesideNative:
-    pytestmark = NATIVE
+    pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 
     def test_both_play_the_same_motion(self):
         native, ours = make_native("PickCube-v1"), tasks.make("PickCube-v1")
