@@ -17,10 +17,8 @@ from robots.common.rooms import ROOMS
 from tasks.processes.start import WorkerError
 
 _CHECKOUT = Path(__file__).parents[2]
-_HINT = (
-    "define it in a module that they can import, or use this process alone: workers=0, and"
-    " num_workers=0 of a vector"
-)
+_ALONE = "use this process alone: workers=0, and num_workers=0 of a vector"
+_HINT = f"define it in a module that they can import, or {_ALONE}"
 
 
 class RemoteError(WorkerError):
@@ -88,7 +86,8 @@ def unsendable(error: Exception) -> WorkerError:
     """Return what to raise if pickling what workers need raised ``error``."""
     return WorkerError(
         f"what the workers need cannot be sent to them: {_words(error)}{_users_line(error)};"
-        f" a task, an expert or a policy must hold what can be pickled; {_HINT}"
+        " a task, an expert or a policy must be defined in a module that they can import and hold"
+        f" what can be pickled, or {_ALONE}"
     )
 
 
