@@ -43,8 +43,8 @@ HEADER, MARGIN, TEXT = 64, 8, 16  # above the panels, beside and in words (pixel
 
 
 def render(
-    task: str,
     *,
+    task: str,
     demo: Path | None = None,
     seed: int | None = None,
     out: Path = Path("runs"),

@@ -21,7 +21,7 @@ from rollouts.recording.record import FILE, record
 
 
 def replay(
-    task: str, *, episodes: int = 25, demo: Path | None = None, out: Path = Path("runs")
+    *, task: str, episodes: int = 25, demo: Path | None = None, out: Path = Path("runs")
 ) -> int:
     """Play recorded actions in native and here, from resets by the recorded seeds.
 

@@ -48,8 +48,8 @@ LEGEND = {
 
 
 def rollout(
-    task: str,
     *,
+    task: str,
     demo: Path | None = None,
     seed: int | None = None,
     out: Path = Path("runs"),

@@ -119,8 +119,7 @@ class Command(NamedTuple):
     """A command of a program.
 
     Attributes:
-        target: The function, or ``module:function``, which is imported when it is run. A module
-            alone has ``add_arguments(parser)`` and ``run(options)``.
+        target: The function, or ``module:function``, which is imported when it is run.
         failed: The exit code after an error of this library.
     """
 
@@ -139,11 +138,8 @@ class Command(NamedTuple):
         """Return what reads its command line."""
         parser = argparse.ArgumentParser(prog, description=self.about)
         function = self._load()
-        if inspect.ismodule(function):
-            function.add_arguments(parser)
-        else:
-            parser.epilog = _documentation(inspect.getdoc(function)).more
-            _add(parser, function)
+        parser.epilog = _documentation(inspect.getdoc(function)).more
+        _add(parser, function)
         return parser
 
     def parse(self, words: Sequence[str], prog: str) -> Call:
@@ -155,16 +151,13 @@ class Command(NamedTuple):
             match = closest_match(unknown[0], flags) if unknown[0].startswith("-") else None
             hint = f". Did you mean {match}?" if match else ""
             parser.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
-        if inspect.ismodule(function):
-            run: Any = function.run
-            return Call(lambda options: run(options), {"options": options}, self.failed)
         return Call(function, _arguments(function, options), self.failed)
 
     def _load(self) -> Any:
         if not isinstance(self.target, str):
             return self.target
         module, _, name = self.target.partition(":")
-        return getattr(import_module(module), name) if name else import_module(module)
+        return getattr(import_module(module), name)
 
 
 @dataclass(frozen=True)
@@ -216,7 +209,7 @@ class Program:
                 sys.path.append(folder)  # for the modules of tasks, experts and policies
         try:
             call = self.parse(words)
-        except UnknownNameError as error:
+        except RobotLayoutsError as error:
             print_error(error)
             return MEANINGLESS
         return call.run()
@@ -357,7 +350,7 @@ def _options(hint: Any) -> dict[str, Any]:
     if origin is tuple and parts[1:] != (...,):
         return {**_options(parts[0]), "nargs": len(parts)}
     if origin in (Sequence, tuple):
-        return {"nargs": "+", **_options(parts[0])}
+        return {"nargs": "+" if origin is Sequence else "*", **_options(parts[0])}
     kind, metavar = {int: (_whole, "N"), float: (_number, "X")}.get(hint, (hint, None))
     return {"type": _reader(kind), **({"metavar": metavar} if metavar else {})}
 

@@ -204,7 +204,7 @@ def test_time_that_is_over_ends_the_search():
         ({"goals": {}}, "at least one place"),
         ({"goals": {"left": [1.0, 2.0]}}, "takes a TcpGoal"),
         ({"goals": {"left": in_the_middle()}, "seed": -1}, "seed is -1"),
-        ({"goals": {"left": in_the_middle()}, "start": [0.0]}, "takes 18 joint positions"),
+        ({"goals": {"left": in_the_middle()}, "start": [0.0]}, "takes 18 finite numbers"),
         ({"goals": {"left": in_the_middle()}, "clearance": -1}, "clearance is -1"),
         ({"goals": {"left": in_the_middle()}, "velocity": 2}, "velocity is 2"),
     ],

@@ -132,10 +132,6 @@ class TestFunctions:
     def test_one_robot_needs_no_place(self):
         assert chosen_robots(["panda"]) == RobotRegistry.load("panda")
 
-    def test_bench_asks_of_which_task(self, capsys):
-        assert main(["bench", "--only", "step", "--robots", "arm=panda"]) == 1
-        assert "of which task? Name it with --task" in capsys.readouterr().err
-
 
 class Idle:
     """A policy that does nothing."""

@@ -24,7 +24,7 @@ from rollouts.playing.in_process import InProcessExecutor
 from rollouts.reading.recording import Recording
 from rollouts.recording.record import record
 from rollouts.recording.recorder import Recorder
-from tasks import MultiRobotTask
+from tasks import TaskEnv
 from tasks.episode import play
 from tests.process_trees import workers_of
 from tests.rollouts.plays import NO_PLAN, TASK, at_random
@@ -173,13 +173,13 @@ def test_a_plan_that_was_rehearsed_is_recorded_without_being_played_again(
 ):
     """It is the same recording, with one control step of the task for each recorded one."""
     steps = Counter[str]()
-    advance = MultiRobotTask.advance
+    advance = TaskEnv.advance
 
     def counted(self, action, env_ids=None):
         steps[name] += 1
         return advance(self, action, env_ids)
 
-    monkeypatch.setattr(MultiRobotTask, "advance", counted)
+    monkeypatch.setattr(TaskEnv, "advance", counted)
     for name, expert in (("again", planned), ("once", pick_cube)):
         monkeypatch.setitem(registry.EXPERTS.registered, "PickCube-v1", expert)
         summary = record("PickCube-v1", range(3), tmp_path / name, workers=0, num_envs=num_envs)
@@ -244,7 +244,11 @@ def test_another_recording_is_not_gone_on_with(tmp_path, capsys):
         (["--episode-timeout=0"], 2, "0 is no limit; it must be seconds, more than 0, or none"),
         (["--episode-timeout=nan"], 2, "nan is no limit; it must be seconds, more than 0, or none"),
         (["--episode-timeout=ten"], 2, "ten is no limit; it must be seconds, more than 0, or none"),
-        (["--workers=0", "--episode-timeout=5"], 1, "with workers=0 this process plays, and nobod"),
+        (
+            ["--workers=0", "--episode-timeout=5"],
+            1,
+            "with workers=0 this process plays",
+        ),
         (["--ray=local"], 1, "'local' is no address of a Ray cluster; it must be"),
         (["--ray="], 1, "'' is no address of a Ray cluster; it must be"),
         (["--ray=auto", "--workers=0"], 1, "workers on a Ray cluster is 0; it must be a whole nu"),

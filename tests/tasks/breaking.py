@@ -62,12 +62,10 @@ class Breaks(PushCube):
 
     hook, way, late = "", "ValueError", False
 
-    def __init__(self, scenario, *, first_seed=None):
-        self._first = first_seed in (None, self.first_seed)
-        super().__init__(scenario, first_seed=first_seed)
-
     def meets(self, hook):
         """Break if this is the place and the time."""
+        if "_first" not in vars(self):  # before any reset that names a seed
+            self._first = self._rngs[0].seed == self.first_seed
         if hook == self.hook and self._first and (not self.late or self._elapsed.any()):
             WAYS[self.way]()
 

@@ -64,7 +64,7 @@ def test_the_own_layout_of_a_task_of_this_library_costs_nothing(monkeypatch):
     def fail(layout, table):
         raise AssertionError("checked")
 
-    monkeypatch.setattr("tasks.engine.task.refuse_collisions", fail)
+    monkeypatch.setattr("tasks.engine.env.refuse_collisions", fail)
     tasks.make(TWO).close()
     with pytest.raises(AssertionError, match="checked"):
         tasks.make(TWO, layout=crowded())

@@ -82,11 +82,13 @@ def test_a_task_computes_the_same_on_tensors(task_id, robot):
     for _ in range(STEPS):
         action = rng.uniform(space.low, space.high, (ENVS, *space.shape)).astype(np.float32)
         env.step(action)
-        state, memory = env._state, env.memory
+        state, memory = env._state, env.task.memory
         remembered = type(memory)(**{key: on_tensors(rows) for key, rows in vars(memory).items()})
-        tensors = dict(leaves(outcome(env, TensorState(state), on_tensors(action), remembered)))
-        arrays = dict(leaves(outcome(env, state, action, deepcopy(memory))))
-        env.memory = memory
+        tensors = dict(
+            leaves(outcome(env.task, TensorState(state), on_tensors(action), remembered))
+        )
+        arrays = dict(leaves(outcome(env.task, state, action, deepcopy(memory))))
+        env.task.memory = memory
         assert tensors.keys() == arrays.keys()
         for name, tensor in tensors.items():
             assert isinstance(tensor, Refusing), name
