@@ -183,6 +183,7 @@ def _server_environment() -> Generator[None]:
     changed = {
         "OMP_NUM_THREADS": "1",
         "PYTHONPATH": os.pathsep.join(sys.path),  # Python before 3.13 forgets it
+        "PYTHONSAFEPATH": "1",  # else the present folder's files hide those of this library
         SERVER_OF: str(os.getpid()),
     }
     before = {name: os.environ.get(name) for name in changed}

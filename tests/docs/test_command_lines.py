@@ -220,7 +220,7 @@ make = "robot-layouts demo"
             ("python -m rollouts demo --sedes 1", "unrecognized arguments: --sedes"),
             ("python -m tasks lost", "Did you mean 'list'"),
             ("python -m benchmarks placings", "Did you mean 'placing'"),
-            ("python -m parity compare --al", "unrecognized arguments: --al"),
+            ("python -m parity compare --evry", "unrecognized arguments: --evry"),
             ("make benhc", "no target benhc"),
             ('make bench ARGS="--recrod"', "unrecognized arguments: --recrod"),
             ("pip install 'robot-layouts[veiw]'", "no extra veiw"),

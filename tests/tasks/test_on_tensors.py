@@ -84,11 +84,10 @@ def test_a_task_computes_the_same_on_tensors(task_id, robot):
         env.step(action)
         state, memory = env._state, env.task.memory
         remembered = type(memory)(**{key: on_tensors(rows) for key, rows in vars(memory).items()})
-        tensors = dict(
-            leaves(outcome(env.task, TensorState(state), on_tensors(action), remembered))
-        )
-        arrays = dict(leaves(outcome(env.task, state, action, deepcopy(memory))))
-        env.task.memory = memory
+        task, acting = env.task, on_tensors(action)
+        tensors = dict(leaves(outcome(task, TensorState(state), acting, remembered)))
+        arrays = dict(leaves(outcome(task, state, action, deepcopy(memory))))
+        task.memory = memory
         assert tensors.keys() == arrays.keys()
         for name, tensor in tensors.items():
             assert isinstance(tensor, Refusing), name
