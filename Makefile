@@ -26,7 +26,7 @@ help:
 	@echo "make clean     remove .venv"
 
 demo: $(VENV)/.demo
-	$(RUN) -m rollouts demo $(ARGS)
+	$(RUN) -m robot_layouts demo $(ARGS)
 
 # One thread a process: the tests share the cores among processes, and results stay the same.
 # To collect the faults, which are tried by `make faults`, takes every process some seconds.

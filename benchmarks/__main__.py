@@ -15,8 +15,8 @@ from benchmarks.robots.survey import mjcfs, robots
 from benchmarks.site.pictures import pictures
 from benchmarks.soak import soak
 from benchmarks.teleop import teleop
-from robots.common.cli import Command, Program
-from robots.common.commands import MEANINGLESS, start
+from robot_layouts.core.cli import Command, Program
+from robot_layouts.core.commands import MEANINGLESS, start
 
 PROGRAM = Program(
     "python -m benchmarks",

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.records import table
-from kinematics.rotations import Floats
 from layouts import Layout, Placement, ring
-from motion.collision.cell import Cell
-from motion.model.obstacles import box
+from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.model.obstacles import box
 
 BATCHES = (1, 16, 64)
 RESOLUTIONS = {"1 cm": (0.01, 0.05), "1 mm": (0.001, np.pi / 360)}  # of edges (m, rad)

@@ -28,11 +28,11 @@ from benchmarks.records import (
 )
 from parity.episodes import recorded_source
 from parity.lockstep import Run, play
+from robot_layouts.data.playing.mode_conversion import followed, turned
+from robot_layouts.data.playing.replay import open_recording, task_for
+from robot_layouts.data.recording.convert import convert
+from robot_layouts.data.recording.record import FILE, record
 from robots import CONTROL_MODES, TaskError
-from rollouts.playing.mode_conversion import followed, turned
-from rollouts.playing.replay import open_recording, task_for
-from rollouts.recording.convert import convert
-from rollouts.recording.record import FILE, record
 from tasks import get_task_class, list_clones
 
 PLACES = "pd_ee_delta_pos", "pd_ee_target_delta_pos"  # they move the TCP's place alone

@@ -28,10 +28,10 @@ from benchmarks.records import (
     write_page,
     write_record,
 )
-from experts import find_expert
-from experts.touching import ArmWatch
 from layouts import Layout, ring, search
 from layouts.frames import Frame
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.touching import ArmWatch
 from robots import LayoutError, TaskError
 from tasks import TaskEnv, get_task_class, make
 from tasks.episode import play

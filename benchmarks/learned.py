@@ -24,8 +24,8 @@ from benchmarks.records import (
     write_page,
     write_record,
 )
-from rollouts.receipts import Receipt
-from rollouts.suite.results import wilson
+from robot_layouts.data.receipts import Receipt
+from robot_layouts.data.suite.results import wilson
 
 ALGORITHMS = {"stable-baselines3": "PPO", "torchrl": "MAPPO"}  # by what a run's settings name
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

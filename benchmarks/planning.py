@@ -24,21 +24,21 @@ from tqdm import tqdm
 
 from benchmarks.records import Record, render, table, versions_of, write_record
 from benchmarks.robots.survey import Robot, find_robots, package_folder
-from experts import follow
-from kinematics.rotations import Floats, quaternion_of
 from layouts import Layout, face_to_face, grid, ring, side_by_side
 from layouts.validation.arguments import Rectangle
-from motion import Motion, NoPlanError, TcpGoal, plan
-from motion.collision.cell import Cell
-from motion.collision.checker import Checker
-from motion.planning.goals import Goal, arm_joints
-from motion.planning.infeasibility import CUT_OFF
-from motion.planning.rrt_connect import import_ompl
-from motion.timing.velocities import import_toppra
+from robot_layouts.core.writing import write_whole
+from robot_layouts.experts import follow
+from robot_layouts.kinematics.rotations import Floats, quaternion_of
+from robot_layouts.motion import Motion, NoPlanError, TcpGoal, plan
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.collision.checker import Checker
+from robot_layouts.motion.planning.goals import Goal, arm_joints
+from robot_layouts.motion.planning.infeasibility import CUT_OFF
+from robot_layouts.motion.planning.rrt_connect import import_ompl
+from robot_layouts.motion.timing.velocities import import_toppra
+from robot_layouts.simulation import State, World
 from robots import RobotDescriptor, RobotLayoutsError, RobotRegistry, TaskError
-from robots.common.writing import write_whole
 from robots.urdf.tcp import find_tcp
-from simulation import State, World
 from tasks import EpisodeRandom, MultiRobotTask, TaskEnv
 
 MODE = "pd_joint_pos"  # control mode

@@ -33,9 +33,9 @@ from benchmarks.records import (
     write_page,
     write_record,
 )
-from experts import find_expert
+from robot_layouts.core.portable import FIXED, GLIBC, NUMPY, portable_variables
+from robot_layouts.experts import find_expert
 from robots import DescriptorError, SimulationError, TaskError
-from robots.common.portable import FIXED, GLIBC, NUMPY, portable_variables
 from robots.portable import numpy_versions
 from tasks import TaskEnv, list_tasks, make
 from tasks.episode import REBUILT

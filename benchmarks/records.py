@@ -12,8 +12,8 @@ from typing import Any
 
 import jinja2
 
+from robot_layouts.core.writing import write_whole
 from robots import RobotLayoutsError
-from robots.common.writing import write_whole
 
 DOCS = Path(__file__).parents[1] / "docs"
 TEMPLATES = Path(__file__).with_name("pages")

@@ -23,13 +23,13 @@ from tqdm import tqdm
 
 import tasks
 from benchmarks.records import versions_of, write_record
-from kinematics.rotations import Floats, rotate
 from layouts.viewer.server import ViewerError
+from robot_layouts.data.teleop.page import GIZMO_SIZE
+from robot_layouts.data.teleop.picture import FIELD_OF_VIEW, viewpoint
+from robot_layouts.data.teleop.session import Session
+from robot_layouts.data.teleop.stopwatch import HTML_ID, MOST, QUICK
+from robot_layouts.kinematics.rotations import Floats, rotate
 from robots import MissingPackageError, TaskError
-from rollouts.teleop.page import GIZMO_SIZE
-from rollouts.teleop.picture import FIELD_OF_VIEW, viewpoint
-from rollouts.teleop.session import Session
-from rollouts.teleop.stopwatch import HTML_ID, MOST, QUICK
 
 # No traffic of the browser's own.
 QUIET = (
@@ -81,7 +81,7 @@ def teleop(
     with (
         closing(tasks.make(task)) as model,
         TemporaryDirectory() as folder,
-        served("rollouts", "teleop", task, "--port", "0", "--out", folder) as command,
+        served("robot_layouts", "teleop", task, "--port", "0", "--out", folder) as command,
         running_browser(*SOFTWARE_WEBGL) as browser,
     ):
         page = browser.new_page(viewport=SIZE)

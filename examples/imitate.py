@@ -32,12 +32,12 @@ from torch import Tensor, nn
 from typing_extensions import Self
 
 import tasks
-from kinematics.rotations import rotation_of
 from layouts import Layout
+from robot_layouts.core.progress import Progress
+from robot_layouts.data import Evaluation, evaluate, record
+from robot_layouts.data.reading.recording import Recording, Trajectory
+from robot_layouts.kinematics.rotations import rotation_of
 from robots import RobotLayoutsError, TaskError
-from robots.common.progress import Progress
-from rollouts import Evaluation, evaluate, record
-from rollouts.reading.recording import Recording, Trajectory
 from tasks import Cube, Normal, Randomization
 from tasks.driving import DrivenGroup, driven_groups
 from tasks.episode import moments

@@ -28,11 +28,11 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 import tasks
+from robot_layouts.core.progress import Progress
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.data.playing.executor import choose_executor
+from robot_layouts.data.reading.recording import Recording
 from robots import TaskError
-from robots.common.progress import Progress
-from rollouts.export.dataset import Export, export
-from rollouts.playing.executor import choose_executor
-from rollouts.reading.recording import Recording
 from tasks.engine.cameras import by_place, cameras_of
 from tasks.engine.columns import ROBOMIMIC, picture_column
 

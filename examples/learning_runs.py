@@ -24,10 +24,10 @@ import torch
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from robot_layouts.core.progress import Progress
+from robot_layouts.core.writing import PARTIAL, remove, write_whole, written_whole
+from robot_layouts.data import evaluate
 from robots import RobotLayoutsError, TaskError
-from robots.common.progress import Progress
-from robots.common.writing import PARTIAL, remove, write_whole, written_whole
-from rollouts import evaluate
 from tasks.episode import Policy
 
 TEST_SEED = 1_000_000  # of the first test episode; the others follow

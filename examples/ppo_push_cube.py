@@ -30,8 +30,8 @@ from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 import tasks
+from robot_layouts.core.progress import Progress
 from robots import RobotLayoutsError
-from robots.common.progress import Progress
 
 TASK = "PushCube-v1"
 EPISODE = 50  # steps

@@ -1,16 +1,16 @@
 """Which robots stand where: placements, presets, checks and pictures."""
 
-from kinematics.own_rooms import expect_own
+from robot_layouts.core.own_packages import expect_own
 
 expect_own("robots")
 
-from kinematics.quaternions import rpy_quaternion, yaw_quaternion
 from layouts.frames import Frame, Pose, ceiling, table, wall
 from layouts.layout import Layout
 from layouts.maniskill import from_maniskill
 from layouts.placement import Placement
 from layouts.placing import search
 from layouts.presets import around_table, face_to_face, grid, ring, side_by_side, single
+from robot_layouts.kinematics.quaternions import rpy_quaternion, yaw_quaternion
 
 __all__ = [
     "Frame",

@@ -1,8 +1,8 @@
 """``python -m layouts COMMAND``: the same as ``robot-layouts layouts COMMAND``."""
 
 from layouts.commands import export, search, show, validate, view
-from robots.common.cli import Command, Program
-from robots.common.commands import start
+from robot_layouts.core.cli import Command, Program
+from robot_layouts.core.commands import start
 
 COMMANDS = {one.__name__: Command(one) for one in (show, validate, search, view, export)}
 main = Program("robot-layouts layouts", COMMANDS).main

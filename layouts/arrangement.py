@@ -9,7 +9,6 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TypeVar
 
-from kinematics.quaternions import yaw_quaternion
 from layouts.frames import (
     ORIGIN,
     Frame,
@@ -20,8 +19,9 @@ from layouts.frames import (
     resolve,
 )
 from layouts.placement import Placement, RobotLike, placed
+from robot_layouts.core.bounds import FAR, checked_number, shown
+from robot_layouts.kinematics.quaternions import yaw_quaternion
 from robots import CONTROL_MODES, LayoutError, UnknownNameError
-from robots.common.bounds import FAR, checked_number, shown
 from robots.descriptor import Vector3
 from robots.parts import BODY
 

@@ -12,10 +12,10 @@ from layouts import frames, placing
 from layouts.layout import Layout
 from layouts.maniskill import TASKS, from_maniskill
 from layouts.presets import FACING, PRESETS
+from robot_layouts.core.bounds import shown
+from robot_layouts.core.cli import Corners, File, Word, by_name
+from robot_layouts.core.commands import LOOPBACK, UsageError
 from robots import LayoutError, UnknownNameError
-from robots.common.bounds import shown
-from robots.common.cli import Corners, File, Word, by_name
-from robots.common.commands import LOOPBACK, UsageError
 from robots.named import FORMS, named_robot
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from kinematics.quaternions import yaw_degrees
+from robot_layouts.kinematics.quaternions import yaw_degrees
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement

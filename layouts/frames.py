@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from kinematics.quaternions import multiplied, normalised, rotated, rpy_quaternion
+from robot_layouts.core.bounds import FAR, as_float, checked_numbers, expect_unit, shown
+from robot_layouts.kinematics.quaternions import multiplied, normalised, rotated, rpy_quaternion
 from robots import LayoutError, UnknownNameError
-from robots.common.bounds import FAR, as_float, checked_numbers, expect_unit, shown
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
 ORIGIN: Vector3 = (0.0, 0.0, 0.0)
@@ -232,7 +232,7 @@ def declared_quaternion(declared: Any, default: Quaternion) -> Quaternion:
 
 
 def check_positive(what: str, value: Any) -> float:
-    """Return a distance: a number greater than 0 and of at most `robots.common.bounds.FAR` (m).
+    """Return a distance: a number greater than 0 and of at most `FAR` (m).
 
     Raises:
         LayoutError: If it is none.
@@ -246,7 +246,7 @@ def check_positive(what: str, value: Any) -> float:
 
 
 def numbers(what: str, values: Any, count: int) -> tuple[float, ...]:
-    """Return ``count`` floats of at most `robots.common.bounds.FAR`.
+    """Return ``count`` floats of at most `robot_layouts.core.bounds.FAR`.
 
     Raises:
         LayoutError: If ``values`` are not that.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from layouts.arrangement import Arrangement
 from layouts.description import describe
-from robots.common.writing import write_whole
+from robot_layouts.core.writing import write_whole
 from robots.named import written_robot
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING
 
-from kinematics.quaternions import inverted, multiplied, normalised
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
+from robot_layouts.core.bounds import as_float, shown
+from robot_layouts.kinematics.quaternions import inverted, multiplied, normalised
 from robots import CONTROL_MODES, LayoutError, RobotDescriptor
-from robots.common.bounds import as_float, shown
 from robots.control_modes import read_mode, written_mode
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 from robots.named import named_robot

@@ -19,12 +19,14 @@ from inspect import signature
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeGuard, cast
 
-from kinematics.quaternions import yaw_quaternion
 from layouts.distances import apart, centred, gaps, ring_of, share_at_table, table_for
 from layouts.frames import EDGES, check_positive
 from layouts.frames import table as table_frames
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
+from robot_layouts.core.bounds import checked_whole, shown
+from robot_layouts.core.catalogue import Catalogue
+from robot_layouts.kinematics.quaternions import yaw_quaternion
 from robots import (
     AssetError,
     LayoutError,
@@ -33,8 +35,6 @@ from robots import (
     RobotRegistry,
     UnknownNameError,
 )
-from robots.common.bounds import checked_whole, shown
-from robots.common.catalogue import Catalogue
 from robots.descriptor import Vector3
 from robots.registry import CATALOGUE as ROBOTS
 

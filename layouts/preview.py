@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinematics.quaternions import forward, yaw_degrees
 from layouts.description import action_text, decimal, facing_text, headline
 from layouts.frames import table_outlines
+from robot_layouts.core.quoting import cut
+from robot_layouts.core.writing import written_whole
+from robot_layouts.kinematics.quaternions import forward, yaw_degrees
 from robots import LayoutError, MissingPackageError
-from robots.common.quoting import cut
-from robots.common.writing import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

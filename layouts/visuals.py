@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from kinematics.rotations import Floats
+from robot_layouts.kinematics.rotations import Floats
 from robots import AssetError, MissingPackageError
 from robots.urdf.mesh_files import expect_near, load_scene
 from robots.urdf.model import UrdfShape

@@ -21,6 +21,8 @@ import yaml
 from layouts.arrangement import Arrangement, check_name
 from layouts.frames import Frame, HangingError, check_frame_names
 from layouts.placement import Placement
+from robot_layouts.core.files import read_text
+from robot_layouts.core.yaml_text import compose
 from robots import (
     LayoutError,
     RobotDescriptor,
@@ -29,8 +31,6 @@ from robots import (
     UnknownNameError,
     UnreadableFileError,
 )
-from robots.common.files import read_text
-from robots.common.yaml_text import compose
 from robots.named import FORMS, robot_in_file
 
 VERSION = 1

@@ -10,8 +10,8 @@ from parity.report import report
 from parity.rollout import rollout
 from parity.sweep import sweep
 from parity.tables import tables
-from robots.common.cli import Command, Program
-from robots.common.commands import MEANINGLESS, start
+from robot_layouts.core.cli import Command, Program
+from robot_layouts.core.commands import MEANINGLESS, start
 
 PROGRAM = Program(
     "python -m parity",

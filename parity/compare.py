@@ -39,8 +39,8 @@ from parity.results import (
     success_text,
     summarise,
 )
+from robot_layouts.core.writing import write_whole
 from robots import CONTROL_MODES, TaskError, closest_match
-from robots.common.writing import write_whole
 from tasks import MultiRobotTask
 
 TABLE_WIDTH = 180  # columns that a table may take; a narrower terminal wraps it

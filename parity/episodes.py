@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tasks
-from experts import find_expert
+from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.reading.summary import recorded_task
+from robot_layouts.experts import find_expert
 from robots import CONTROL_MODES, TaskError
-from rollouts.reading.recording import Recording, TrajectoryError
-from rollouts.reading.summary import recorded_task
 from tasks import MultiRobotTask
 from tasks.episode import Episode
 

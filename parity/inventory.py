@@ -10,10 +10,10 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from experts import list_experts
 from parity.episodes import find_demonstrations
 from parity.native import native_tasks
 from parity.results import RESULTS, read_results
+from robot_layouts.experts import list_experts
 from robots import MissingPackageError, RobotRegistry
 from tasks import get_task_class, list_clones, list_tasks
 

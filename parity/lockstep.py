@@ -15,8 +15,8 @@ from torch import Tensor
 
 import tasks
 from parity.native import make_native, native_action, native_action_dim, quiet
+from robot_layouts.simulation.sapien3.contacts import presses_on_object
 from robots import CONTROL_MODES, TaskError
-from simulation.sapien3.contacts import presses_on_object
 from tasks import TaskEnv
 from tasks.episode import Episode
 

@@ -27,9 +27,9 @@ from parity.scene import (
     difference,
     expect_same_shapes,
 )
+from robot_layouts.core.writing import write_whole
+from robot_layouts.data.video import INSTALL, open_video, package_problem
 from robots import MissingPackageError, TaskError
-from robots.common.writing import write_whole
-from rollouts.video import INSTALL, open_video, package_problem
 
 NAME = "side_by_side"
 # Of 255: mean difference between a state drawn and the same state seen live. Rounding of poses

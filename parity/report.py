@@ -11,7 +11,6 @@ from typing import Any
 
 import jinja2
 
-from experts import list_experts
 from parity.inventory import missing_tasks
 from parity.lockstep import STATE
 from parity.render import is_verified
@@ -24,8 +23,9 @@ from parity.results import (
     success_text,
 )
 from parity.sweep import SUMMARY, read_summary
+from robot_layouts.core.writing import write_whole
+from robot_layouts.experts import list_experts
 from robots import MissingPackageError
-from robots.common.writing import write_whole
 from tasks import get_task_class, list_clones
 from tasks.description import read_docstring, robots_text
 

@@ -25,9 +25,9 @@ from parity.lockstep import NativeSide, OurSide, Side, Snapshot, largest_differe
 from parity.native import native_agents
 from parity.results import number_text, versions
 from parity.scene import NativeScene
-from robots.common.writing import written_whole
-from rollouts.reading.recording import TrajectoryError
-from rollouts.video import open_video
+from robot_layouts.core.writing import written_whole
+from robot_layouts.data.reading.recording import TrajectoryError
+from robot_layouts.data.video import open_video
 from tasks import MultiRobotTask, TaskEnv
 from tasks.episode import Episode
 from tasks.native.format import articulation_keys

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from parity.lockstep import Snapshot, state_dict
 from parity.native import quiet
+from robot_layouts.simulation.sapien3.collision import described_shapes
 from robots import RobotLayoutsError
-from simulation.sapien3.collision import described_shapes
 from tasks import TaskEnv
 
 Picture = NDArray[np.uint8]  # (H, W, 3), red, green, blue

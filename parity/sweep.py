@@ -17,7 +17,6 @@ import torch
 from tqdm import tqdm
 
 import tasks
-from experts import list_experts
 from parity.episodes import (
     Source,
     expert_source,
@@ -29,8 +28,9 @@ from parity.lockstep import EpisodeResult, Run, play
 from parity.render import is_verified, make_clip
 from parity.results import ResultsError, as_json, number_text, versions
 from parity.rollout import roll_out
+from robot_layouts.core.writing import write_whole
+from robot_layouts.experts import list_experts
 from robots import TaskError
-from robots.common.writing import write_whole
 
 SUMMARY, LOG = "summary.json", "sweep.log"
 NO_DEMONSTRATION = "there is no demonstration and no expert: random actions show no success"

@@ -16,7 +16,7 @@ from parity.results import (
     reward_text,
     success_text,
 )
-from robots.common.writing import write_whole
+from robot_layouts.core.writing import write_whole
 from tasks import list_clones
 
 PAGE = Path(__file__).parents[1] / "docs" / "parity.md"

@@ -10,8 +10,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from robots.assets.locator import LocalUrdf, UrdfLocator
-from robots.common.errors import (
+from robot_layouts.core.errors import (
     ActionError,
     AssetError,
     DescriptorError,
@@ -26,7 +25,8 @@ from robots.common.errors import (
     closest_match,
     unknown_name_message,
 )
-from robots.common.portable import is_portable
+from robot_layouts.core.portable import is_portable
+from robots.assets.locator import LocalUrdf, UrdfLocator
 from robots.descriptor import (
     CONTROL_MODES,
     ActionNumber,

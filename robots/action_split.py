@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
+from robot_layouts.core.errors import DescriptorError, UnknownNameError, unknown_name_message
+from robot_layouts.core.schema import check, check_fields
 from robots.commands import COMMANDS, FRAMES, Command
-from robots.common.errors import DescriptorError, UnknownNameError, unknown_name_message
-from robots.common.schema import check, check_fields
 
 
 def names(prefix: str, first: int, last: int) -> tuple[str, ...]:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from math import pi
 from types import MappingProxyType
 
+from robot_layouts.core.bounds import shown
+from robot_layouts.core.errors import DescriptorError
 from robots.action_split import ActionSplit, JointGroup, is_gripper
-from robots.common.bounds import shown
-from robots.common.errors import DescriptorError
 
 # mani_skill 3.0.1, agents/robots/panda/panda.py
 SPEED = 1.0  # rad/s or m/s, of an action number of 1

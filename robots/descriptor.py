@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, NoReturn, Protocol, runtime_checkable
 
+from robot_layouts.core.errors import DescriptorError, UnknownNameError
+from robot_layouts.core.schema import check_fields
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
-from robots.common.errors import DescriptorError, UnknownNameError
-from robots.common.schema import check_fields
 from robots.control_modes import CONTROL_MODES, MODES, driven_in
 from robots.parts import (
     IDENTITY,

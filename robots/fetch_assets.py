@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
+from robot_layouts.core.cli import Word, main_of
+from robot_layouts.core.commands import UsageError, print_error, printable, start
+from robot_layouts.core.errors import RobotLayoutsError
+from robot_layouts.core.paths import absolute, default_root
 from robots.assets import scenery
 from robots.assets.fetching import default_sources, ensure
 from robots.assets.locator import UrdfLocator
@@ -19,10 +23,6 @@ from robots.assets.sources import (
     PackageWheel,
 )
 from robots.assets.store import AssetStore, FileState
-from robots.common.cli import Word, main_of
-from robots.common.commands import UsageError, print_error, printable, start
-from robots.common.errors import RobotLayoutsError
-from robots.common.paths import absolute, default_root
 from robots.descriptor import RobotDescriptor
 from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry

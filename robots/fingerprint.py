@@ -6,8 +6,8 @@ import hashlib
 import os
 from pathlib import Path
 
-from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.files import read_regular
+from robot_layouts.core.errors import AssetError, UnreadableFileError
+from robot_layouts.core.files import read_regular
 from robots.descriptor import UrdfSource
 from robots.urdf.mesh_files import MAX_MESH_BYTES
 from robots.urdf.srdf import srdf_beside

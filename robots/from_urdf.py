@@ -11,16 +11,16 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
-from robots.assets.locator import LocalUrdf
-from robots.common.cli import Word, main_of
-from robots.common.commands import start
-from robots.common.errors import (
+from robot_layouts.core.cli import Word, main_of
+from robot_layouts.core.commands import start
+from robot_layouts.core.errors import (
     AssetError,
     DescriptorError,
     MissingPackageError,
     UnknownNameError,
 )
-from robots.common.paths import absolute
+from robot_layouts.core.paths import absolute
+from robots.assets.locator import LocalUrdf
 from robots.guess import Guess, guess
 from robots.guessing.hints import NOTHING, Hints, hints_of
 from robots.mjcf.locator import LocalMjcf, is_mjcf

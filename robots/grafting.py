@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
+from robot_layouts.core.errors import DescriptorError, UnknownNameError
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
 from robots.action_split import ActionSplit, JointGroup
 from robots.assets.assembled import AssembledUrdf, Part, carried_by
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.bodies.overlaps import guess_allowed
-from robots.common.errors import DescriptorError, UnknownNameError
 from robots.control_modes import CONTROL_MODES
 from robots.descriptor import (
     IDENTITY,

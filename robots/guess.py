@@ -10,13 +10,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from kinematics.rotations import Floats
+from robot_layouts.core.errors import DescriptorError
+from robot_layouts.core.schema import check
+from robot_layouts.kinematics.rotations import Floats
 from robots.action_split import ActionSplit, JointGroup
 from robots.bodies.allowed import joined_pairs, rigid_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls
 from robots.bodies.overlaps import guess_allowed, overlapping
-from robots.common.errors import DescriptorError
-from robots.common.schema import check
 from robots.descriptor import RobotDescriptor, UrdfSource
 from robots.guessing import words
 from robots.guessing.anatomy import Anatomy, Limb, find_anatomy

@@ -8,14 +8,14 @@ from typing import Annotated
 
 import numpy as np
 
+from robot_layouts.core.cli import Word, main_of
+from robot_layouts.core.commands import print_error, start
+from robot_layouts.core.paths import default_root
 from robots.assets.locator import LocalUrdf, UrdfLocator
 from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
 from robots.assets.progress import size
 from robots.assets.store import AssetStore, FileState
-from robots.common.cli import Word, main_of
-from robots.common.commands import print_error, start
-from robots.common.paths import default_root
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
 from robots.mjcf.locator import LocalMjcf

@@ -7,11 +7,11 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
+from robot_layouts.core.errors import AssetError, DescriptorError, closest_match
+from robot_layouts.core.importing import imported
+from robot_layouts.core.paths import absolute
+from robot_layouts.core.quoting import shown
 from robots.assets.locator import LocalUrdf
-from robots.common.errors import AssetError, DescriptorError, closest_match
-from robots.common.importing import imported
-from robots.common.paths import absolute
-from robots.common.quoting import shown
 from robots.descriptor import RobotDescriptor
 from robots.mjcf.locator import ENDINGS, LocalMjcf, is_mjcf
 from robots.registry import ROBOTS, RobotRegistry, checked_robot

@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from robot_layouts.core.cli import Folder, main_of
+from robot_layouts.core.commands import notice, start
+from robot_layouts.core.errors import DescriptorError
+from robot_layouts.core.new_files import check_module_name, write_new
 from robots.assets.locator import LocalUrdf
-from robots.common.cli import Folder, main_of
-from robots.common.commands import notice, start
-from robots.common.errors import DescriptorError
-from robots.common.new_files import check_module_name, write_new
 from robots.data_module import write_module
 from robots.from_urdf import guess_descriptor
 from robots.mjcf.locator import LocalMjcf
@@ -25,7 +25,7 @@ _TEST = '''"""Tests whether {name} stands and moves as it should; run it with py
 
 from layouts import single
 from robots import RobotRegistry
-from simulation.checks.trial import try_robot
+from robot_layouts.simulation.checks.trial import try_robot
 from {module} import {constant}
 
 

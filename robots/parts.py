@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, groupby
 
+from robot_layouts.core.bounds import expect_unit
+from robot_layouts.core.errors import DescriptorError
+from robot_layouts.core.schema import check_fields
 from robots.action_split import ActionSplit
-from robots.common.bounds import expect_unit
-from robots.common.errors import DescriptorError
-from robots.common.schema import check_fields
 
 Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # wxyz

@@ -11,10 +11,10 @@ import shutil
 from collections.abc import Sequence
 from typing import Annotated, NoReturn
 
-from robots.common.cli import Word, main_of
-from robots.common.commands import start
-from robots.common.errors import RobotLayoutsError, SimulationError
-from robots.common.portable import portable_variables
+from robot_layouts.core.cli import Word, main_of
+from robot_layouts.core.commands import start
+from robot_layouts.core.errors import RobotLayoutsError, SimulationError
+from robot_layouts.core.portable import portable_variables
 
 
 def portable(program: Annotated[Sequence[str], Word("PROGRAM", nargs="...")] = ()) -> None:

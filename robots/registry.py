@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from robots.common.catalogue import Catalogue
-from robots.common.errors import DescriptorError, RobotLayoutsError
-from robots.common.quoting import shown
+from robot_layouts.core.catalogue import Catalogue
+from robot_layouts.core.errors import DescriptorError, RobotLayoutsError
+from robot_layouts.core.quoting import shown
 from robots.descriptor import RobotDescriptor
 
 # One name per robot, sorted: that of its module, and in capitals that of its descriptor.

@@ -10,6 +10,12 @@ from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 
+from robot_layouts.core.cli import main_of
+from robot_layouts.core.commands import start
+from robot_layouts.core.errors import AssetError
+from robot_layouts.core.files import read_regular, read_text
+from robot_layouts.core.paths import CHECKOUT_CACHE
+from robot_layouts.core.writing import write_whole
 from robots.assets import scenery
 from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import (
@@ -27,12 +33,6 @@ from robots.assets.packages import (
     SourceError,
     find_package,
 )
-from robots.common.cli import main_of
-from robots.common.commands import start
-from robots.common.errors import AssetError
-from robots.common.files import read_regular, read_text
-from robots.common.paths import CHECKOUT_CACHE
-from robots.common.writing import write_whole
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import UrdfReferences, read_references
 

@@ -24,14 +24,14 @@ Writing a task (functions of arrays are in `tasks.maths`):
 ``robot-layouts tasks list`` prints them as a table. Importing this loads neither torch nor sapien.
 """
 
-from kinematics.own_rooms import expect_own
+from robot_layouts.core.own_packages import expect_own
 
-expect_own("robots", "layouts", "simulation")
+expect_own("robots", "layouts")
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from robots.common.module_names import missing_name
+from robot_layouts.core.module_names import missing_name
 from tasks.fronts import lerobot_vec_env, parallel_env, register, sb3_vec_env
 from tasks.registry import get_task_class, list_clones, list_tasks, make, on_registration
 

@@ -1,7 +1,7 @@
 """``python -m tasks COMMAND``: the same as ``robot-layouts tasks COMMAND``, but for recordings."""
 
-from robots.common.cli import Command, Program
-from robots.common.commands import start
+from robot_layouts.core.cli import Command, Program
+from robot_layouts.core.commands import start
 from tasks.commands import preview, print_description, print_list, view
 
 COMMANDS = {

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from layouts import Layout
+from robot_layouts.core.cli import File, Word, by_name
+from robot_layouts.core.commands import notice
 from robots import RobotDescriptor, TaskError
-from robots.common.cli import File, Word, by_name
-from robots.common.commands import notice
 from robots.named import FORMS, is_path, named_robot
 from tasks.language.needs import ACT, HOLD
 from tasks.varying.randomization import Randomization

@@ -8,10 +8,10 @@ from typing import Annotated
 from rich.console import Console
 
 from layouts.commands import Page
+from robot_layouts.core.cli import File, Word
+from robot_layouts.core.commands import print_error
+from robot_layouts.core.progress import Progress
 from robots import RobotLayoutsError, TaskError
-from robots.common.cli import File, Word
-from robots.common.commands import print_error
-from robots.common.progress import Progress
 from tasks.cell_options import Cell
 from tasks.description import (
     TaskFacts,

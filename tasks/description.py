@@ -16,9 +16,9 @@ from rich.console import RenderableType
 from rich.table import Table
 
 from layouts import Layout
+from robot_layouts.simulation import Camera
+from robot_layouts.simulation.scene.cameras import RobotCamera
 from robots import TaskError
-from simulation import Camera
-from simulation.scene.cameras import RobotCamera
 from tasks.engine.cameras import cameras_of
 from tasks.engine.env import MultiRobotTask, TaskEnv
 from tasks.registry import full_name, get_task_class, make, origin, other_names

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinematics.rotations import Floats, inverse, multiply, rotate, rotation_of
 from layouts import Layout
+from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate, rotation_of
+from robot_layouts.simulation import State
 from robots import JointGroup
-from simulation import State
 from tasks.engine.env import TaskEnv
 
 _NEARLY = 1.0 + 1e-4  # of a normalised number that is just at its bound
@@ -205,7 +205,7 @@ def _normalised(group: JointGroup, values: Floats) -> tuple[Floats, bool]:
 
 
 def _remembered(task: TaskEnv, driven: DrivenGroup, kind: str) -> Floats:
-    """Return what a group was last asked for; see `simulation.control.modes.Remembered`."""
+    """Return what a group was last asked for; see `Remembered`."""
     modes = task.simulation.modes
     assert modes is not None
     names = [(kept.robot, kept.group, kept.kind) for kept in modes.remembered]

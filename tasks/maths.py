@@ -1,9 +1,9 @@
-"""Functions of the arrays that a state gives, NumPy's or torch's; see `simulation.maths`."""
+"""Functions of the arrays that a state gives, NumPy's or torch's; see `maths`."""
 
 from typing import TYPE_CHECKING, NoReturn
 
-from robots.common.module_names import missing_name
-from simulation.maths import (
+from robot_layouts.core.module_names import missing_name
+from robot_layouts.simulation.maths import (
     Array,
     Flags,
     Floats,

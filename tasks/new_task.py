@@ -17,13 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinematics.rotations import rotate
 from layouts import Layout, face_to_face, ring, single
+from robot_layouts.core.cli import Folder, by_name, main_of
+from robot_layouts.core.commands import notice, start
+from robot_layouts.core.new_files import check_module_name, write_new
+from robot_layouts.core.paths import absolute
+from robot_layouts.kinematics.rotations import rotate
 from robots import RobotDescriptor, TaskError
-from robots.common.cli import Folder, by_name, main_of
-from robots.common.commands import notice, start
-from robots.common.new_files import check_module_name, write_new
-from robots.common.paths import absolute
 from robots.named import is_path, named_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
@@ -40,8 +40,8 @@ SPREAD, ASIDE = 0.05, 0.1
 _TASK = '''"""{title}: every arm brings its tool centre point to a ball in the air."""
 
 {paths}from experts import register_expert
-from experts.reaching import reaching
-from experts.rehearsal import first_success
+from robot_layouts.experts.reaching import reaching
+from robot_layouts.experts.rehearsal import first_success
 {imports}
 from tasks.maths import norm
 
@@ -103,7 +103,7 @@ _TEST = '''"""Tests of {task_id}; run them with pytest, in this folder."""
 import numpy as np
 
 import tasks
-from experts import find_expert
+from robot_layouts.experts import find_expert
 from tasks.episode import play
 
 TASK = "{module}:{task_id}"

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.writing import written_whole
+from robot_layouts.simulation.rendering.pictures import FIELD_OF_VIEW
+from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from robots import MissingPackageError, TaskError, UnknownNameError
-from robots.common.bounds import checked_whole
-from robots.common.writing import written_whole
-from simulation.rendering.pictures import FIELD_OF_VIEW
-from simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from tasks.engine.cameras import cameras_of, resized
 from tasks.engine.env import TaskEnv
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike, load_robot
+from robot_layouts.core.bounds import shown
+from robot_layouts.core.catalogue import Catalogue, reason
 from robots import RobotDescriptor, RobotLayoutsError, TaskError, UnknownNameError, closest_match
-from robots.common.bounds import shown
-from robots.common.catalogue import Catalogue, reason
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

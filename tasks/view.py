@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinematics.rotations import Floats, pose_matrix
 from layouts.viewer import Cell, Motion, Thing
 from layouts.visuals import Part, coloured, load_meshes
+from robot_layouts.kinematics.rotations import Floats, pose_matrix
+from robot_layouts.simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from robots import TaskError
-from simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from tasks.engine.env import TaskEnv
 from tasks.native.format import articulation_keys, declared_joints
 

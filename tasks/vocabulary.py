@@ -3,8 +3,7 @@
 Functions of arrays are in `tasks.maths`, presets of layouts in `layouts`.
 """
 
-from robots.descriptor import Quaternion, Vector3
-from simulation import (
+from robot_layouts.simulation import (
     Box,
     Camera,
     Capsule,
@@ -19,8 +18,9 @@ from simulation import (
     World,
     add_table,
 )
-from simulation.scene.shapes import POLISHED, Color, Finish, linear
-from simulation.state import once_per_state
+from robot_layouts.simulation.scene.shapes import POLISHED, Color, Finish, linear
+from robot_layouts.simulation.state import once_per_state
+from robots.descriptor import Quaternion, Vector3
 from tasks.engine.env import MultiRobotTask, TaskEnv
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import Info

@@ -85,14 +85,14 @@ def renderer() -> object:
     It goes with the last scene that can be drawn, and the next one would compute how light is
     reflected anew: 6 s of processor time.
     """
-    from simulation.rendering.pictures import vulkan_problem
+    from robot_layouts.simulation.rendering.pictures import vulkan_problem
 
     if vulkan_problem():
         return None
     from sapien import Device
     from sapien.render import RenderSystem
 
-    from simulation.sapien3.device import outlive_forks
+    from robot_layouts.simulation.sapien3.device import outlive_forks
 
     system = RenderSystem(Device("cpu"))  # native's; a process can draw on no more than one
     outlive_forks(system)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinematics.rotations import inverse, multiply, rotate, rotation_of
 from layouts import Layout, Placement
-from simulation import PhysicsSettings, Simulation
+from robot_layouts.kinematics.rotations import inverse, multiply, rotate, rotation_of
+from robot_layouts.simulation import PhysicsSettings, Simulation
 
 CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))
 STEPS, REST = 20, 20  # of a side, and at its end

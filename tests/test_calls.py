@@ -44,8 +44,8 @@ def calls_of(function: Callable[[], Any]) -> tuple[int, Any]:
 
 def calls_of_verbs() -> dict[str, int]:
     import layouts
-    import motion
     import tasks
+    from robot_layouts import motion
     from tests.motion.two_pandas import aside, cell, turned
 
     counts: dict[str, int] = {}

@@ -10,7 +10,7 @@ from importlib import metadata
 import pytest
 import yaml
 
-from robots.common.rooms import ROOMS
+from robot_layouts.core.rooms import PACKAGES
 from tests.checkout import ROOT, tracked_files
 
 if sys.version_info >= (3, 11):
@@ -42,16 +42,18 @@ def files():
 
 class TestWheel:
     def test_carries_every_module_of_every_room(self, wheel):
-        modules = {path.relative_to(ROOT).as_posix() for room in ROOMS for path in modules_of(room)}
+        modules = {
+            path.relative_to(ROOT).as_posix() for room in PACKAGES for path in modules_of(room)
+        }
         assert modules <= {*wheel.namelist()}
 
-    @pytest.mark.parametrize("room", ROOMS)
+    @pytest.mark.parametrize("room", PACKAGES)
     def test_is_typed(self, wheel, room):
         assert f"{room}/py.typed" in wheel.namelist()
 
     def test_carries_what_pages_are_made_of(self, wheel):
-        sheets = {f"robots/common/{name}.css" for name in ("palette", "page")}
-        suites = {f"rollouts/suite/{name}" for name in ("suite.css", "standard.yaml")}
+        sheets = {f"robot_layouts/core/{name}.css" for name in ("palette", "page")}
+        suites = {f"robot_layouts/data/suite/{name}" for name in ("suite.css", "standard.yaml")}
         templates = {
             path.relative_to(ROOT).as_posix()
             for room in ("robots", "rollouts")
@@ -68,7 +70,7 @@ class TestWheel:
     def test_carries_no_robot_file_and_nothing_outside_the_rooms(self, wheel):
         for name in wheel.namelist():
             assert not name.lower().endswith(ROBOT_FILES)
-            assert name.split("/")[0] in ROOMS or ".dist-info/" in name
+            assert name.split("/")[0] in PACKAGES or ".dist-info/" in name
 
 
 class TestRelease:
@@ -123,7 +125,7 @@ class TestDependencies:
             "xacro",
         ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])
-        used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
+        used = {module for room in PACKAGES for module in imports_of(room, everywhere=True)}
         # mujoco is of two distributions, which a third one needs.
         assert distributions(used - {"mujoco"}) <= declared
 
@@ -136,7 +138,7 @@ class TestDependencies:
         )
 
     def test_every_core_dependency_is_used(self):
-        used = {module for room in ROOMS for module in imports_of(room, everywhere=True)}
+        used = {module for room in PACKAGES for module in imports_of(room, everywhere=True)}
         through_others = {"pycollada"}  # trimesh reads Collada by it
         assert names_of(PROJECT["dependencies"]) <= distributions(used) | through_others
 
@@ -150,9 +152,9 @@ class TestDependencies:
 
 # Imported inside functions only, after its extra was found to be installed.
 LOADED_WITH_ITS_EXTRA = {
-    "rollouts/export/lerobot.py",
-    "rollouts/export/lerobot_files.py",
-    "rollouts/export/lerobot_pictures.py",
+    "robot_layouts/data/export/lerobot.py",
+    "robot_layouts/data/export/lerobot_files.py",
+    "robot_layouts/data/export/lerobot_pictures.py",
     "tasks/fronts/parallel.py",
     "tasks/fronts/sb3.py",
 }
@@ -174,7 +176,7 @@ def imports_of(room, *, everywhere):
                 found |= {alias.name.split(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
                 found.add(node.module.split(".")[0])
-    return found - {*ROOMS} - sys.stdlib_module_names
+    return found - {*PACKAGES} - sys.stdlib_module_names
 
 
 def at_import_time(node):

@@ -17,8 +17,8 @@ import tasks
 from benchmarks.bench.measurement import Measurement, Sample, Settings, SomeValue, measured
 from benchmarks.bench.worlds import crowd, make_crowd, make_pile
 from parity.native import make_native, native_action
-from rollouts.recording.recorder import Recorder
-from simulation.rendering.pictures import vulkan_problem
+from robot_layouts.data.recording.recorder import Recorder
+from robot_layouts.simulation.rendering.pictures import vulkan_problem
 from tasks import (
     CameraShift,
     Distractors,

@@ -16,7 +16,7 @@ from rich.table import Table
 from benchmarks.bench.measurement import CORES, BenchmarkError, Measurement, Value, number_text
 from benchmarks.bench.plot import draw
 from benchmarks.records import DOCS, as_text, listed, render, table, versions_of
-from robots.common.writing import write_whole, written_whole
+from robot_layouts.core.writing import write_whole, written_whole
 
 RECORD = DOCS / "benchmarks.json"
 PICTURE = DOCS / "images" / "benchmarks.png"

@@ -19,8 +19,8 @@ from benchmarks.bench.measurement import BenchmarkError, Measurement, Settings
 from benchmarks.bench.report import PICTURE, RECORD, Report, machine, read_report, summary
 from benchmarks.records import DOCS
 from parity.tables import replace_table, update
+from robot_layouts.core.writing import write_whole
 from robots import MissingPackageError, RobotRegistry, SimulationError, UnknownNameError
-from robots.common.writing import write_whole
 from tasks import get_task_class, list_clones
 from tasks.registry import full_name
 

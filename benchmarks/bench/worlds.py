@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from layouts import Layout, ring, single
-from simulation import PhysicsSettings, State, World, add_table
-from simulation.maths import Array
+from robot_layouts.simulation import PhysicsSettings, State, World, add_table
+from robot_layouts.simulation.maths import Array
 from tasks import EpisodeRandom, MultiRobotTask, TaskEnv
 from tasks.engine.task import Info
 from tasks.language.props import BLUE, add_cube, add_wide_table

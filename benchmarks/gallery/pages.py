@@ -37,6 +37,8 @@ from layouts import Layout
 from layouts.description import action_text, decimal, facing_text
 from parity.results import number_text as difference_text
 from parity.results import read_results
+from robot_layouts.core.writing import write_whole
+from robot_layouts.data import evaluate
 from robots import (
     CONTROL_MODES,
     AssetError,
@@ -46,11 +48,9 @@ from robots import (
     UnknownNameError,
 )
 from robots.assets.progress import size
-from robots.common.writing import write_whole
 from robots.registry import CATALOGUE as ROBOTS
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
-from rollouts import evaluate
 from tasks import MultiRobotTask, get_task_class
 from tasks.description import (
     action_sentence,

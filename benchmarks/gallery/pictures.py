@@ -17,21 +17,21 @@ from numpy.typing import NDArray
 
 import tasks
 from benchmarks.records import Record, RecordError
-from experts import find_expert
-from kinematics.quaternions import multiplied, normalised, yaw_quaternion
 from layouts import Layout, Placement
+from robot_layouts.core.writing import write_whole
+from robot_layouts.experts import find_expert
+from robot_layouts.kinematics.quaternions import multiplied, normalised, yaw_quaternion
+from robot_layouts.simulation import Camera
+from robot_layouts.simulation.checks.overlaps import empty, stand
+from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.scene.cameras import View
+from robot_layouts.simulation.simulation import Simulation
 from robots import DescriptorError, MissingPackageError, RobotDescriptor, RobotRegistry
 from robots.assets.locator import LocalUrdf, UrdfLocator
 from robots.assets.manifest import AssetPackage, load_manifest
 from robots.assets.packages import EXAMPLE_ROBOT_DATA
-from robots.common.writing import write_whole
 from robots.registry import CATALOGUE as ROBOTS
 from robots.urdf.summary import parse_urdf, read_urdf
-from simulation import Camera
-from simulation.checks.overlaps import empty, stand
-from simulation.rendering.pictures import vulkan_problem
-from simulation.scene.cameras import View
-from simulation.simulation import Simulation
 from tasks import TaskEnv
 from tasks.engine.columns import overview
 from tasks.episode import play
@@ -107,7 +107,7 @@ class Lens:
         return Camera(at, target, name, width, height, self.fov)
 
 
-# SAPIEN's lamps (`simulation.sapien3.pictures.studio`) shine from behind this camera, a bit from
+# SAPIEN's lamps (`studio`) shine from behind this camera, a bit from
 # the right; the robot faces to the right, towards the viewer.
 PORTRAIT, FACING = Lens(radians(-168), radians(18), radians(24)), radians(-120)
 

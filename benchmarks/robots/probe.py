@@ -19,10 +19,14 @@ from typing import Any
 import numpy as np
 import yaml
 
-from kinematics.rotations import Floats, inverse_pose
 from layouts import Layout, Placement, face_to_face, side_by_side, single
 from layouts.validation.collisions import nearest
 from layouts.validation.collisions import stand as stand_hulls
+from robot_layouts.kinematics.rotations import Floats, inverse_pose
+from robot_layouts.simulation import PhysicsSettings
+from robot_layouts.simulation.checks.overlaps import empty, stand
+from robot_layouts.simulation.checks.trial import tcp_error, try_robot
+from robot_layouts.simulation.simulation import Simulation
 from robots import RobotDescriptor, RobotLayoutsError
 from robots.bodies.hulls import RobotModel, load_model
 from robots.bodies.overlaps import overlapping
@@ -34,10 +38,6 @@ from robots.mjcf.robot import find_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
-from simulation import PhysicsSettings
-from simulation.checks.overlaps import empty, stand
-from simulation.checks.trial import tcp_error, try_robot
-from simulation.simulation import Simulation
 
 MEMORY = 8 << 30  # bytes of this process
 STEPS = 500

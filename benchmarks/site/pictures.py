@@ -12,12 +12,12 @@ from tqdm import tqdm
 
 import tasks
 from benchmarks.records import DOCS
-from experts import find_expert
 from layouts import Layout, ring, search, table
-from motion import TcpGoal, plan
+from robot_layouts.core.writing import write_whole
+from robot_layouts.experts import find_expert
+from robot_layouts.motion import TcpGoal, plan
+from robot_layouts.simulation.scene.cameras import Camera
 from robots import UnknownNameError
-from robots.common.writing import write_whole
-from simulation.scene.cameras import Camera
 from tasks.episode import play
 
 WIDTH, HEIGHT = 640, 340  # of rendered pictures (pixels)

@@ -6,7 +6,7 @@ from math import pi
 import numpy as np
 from tray import TwoArmTray
 
-from experts import (
+from robot_layouts.experts import (
     CLOSED,
     Waypoint,
     bringing,

@@ -10,13 +10,19 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from kinematics.rotations import Floats, inverse_pose, pose_matrix, rpy_pose, transform
 from layouts.arrangement import Arrangement
 from layouts.export.names import Names
 from layouts.placement import Placement
+from robot_layouts.core.commands import notice
+from robot_layouts.kinematics.rotations import (
+    Floats,
+    inverse_pose,
+    pose_matrix,
+    rpy_pose,
+    transform,
+)
 from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
-from robots.common.commands import notice
 from robots.descriptor import JointGroup
 from robots.urdf.checks import MOMENTS, PRODUCTS
 from robots.urdf.model import ModelJoint, UrdfModel

@@ -13,13 +13,13 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 import yaml
 
-from kinematics.quaternions import quaternion_rpy
 from layouts.export.folders import replaced_folder
 from layouts.export.names import Names
 from layouts.export.urdf import base_link
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
+from robot_layouts.core.writing import write_whole
+from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots import LayoutError, RobotDescriptor
-from robots.common.writing import write_whole
 from robots.urdf.paths import resolve
 from robots.urdf.summary import parse_urdf, read_urdf
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
+from robot_layouts.core.writing import PARTIAL, remove, written_whole
 from robots import LayoutError
-from robots.common.writing import PARTIAL, remove, written_whole
 
 LICENCES = "LICENCES.md"  # a note on those of robot files
 

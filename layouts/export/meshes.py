@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from kinematics.rotations import Floats
 from layouts.export.cell import RobotSource
 from layouts.export.names import Names
 from layouts.visuals import GREY, Rgba, read_visuals, simplified
+from robot_layouts.kinematics.rotations import Floats
 from robots import AssetError, MissingPackageError
 from robots.bodies.hulls import shape_corners
 from robots.urdf.model import SIZES, UrdfShape

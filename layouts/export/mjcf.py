@@ -11,15 +11,15 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from kinematics.quaternions import multiplied
-from kinematics.rotations import Floats, quaternion_of
 from layouts.export.cell import ExportedCell, Inertial, RobotSource, Standing
 from layouts.export.folders import LICENCES, replaced_folder
 from layouts.export.licences import licence_note
 from layouts.export.meshes import Drawn, MeshFolder, Solid, drawn_meshes, solid_shapes
 from layouts.visuals import GREY, Rgba
+from robot_layouts.core.writing import write_whole
+from robot_layouts.kinematics.quaternions import multiplied
+from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robots import CameraMount, LayoutError
-from robots.common.writing import write_whole
 from robots.urdf.model import ModelJoint
 
 if TYPE_CHECKING:

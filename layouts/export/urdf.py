@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
-from kinematics.quaternions import quaternion_rpy
+from robot_layouts.core.writing import written_whole
+from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots import LayoutError, RobotDescriptor
 from robots.bodies.allowed import joined_pairs, read_allowed_pairs
-from robots.common.writing import written_whole
 from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model

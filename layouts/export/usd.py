@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinematics.rotations import Floats, inverse_pose, pose_matrix
 from layouts.export.cell import ExportedCell, RobotSource, Standing
 from layouts.export.licences import licence_note
 from layouts.export.meshes import drawn_meshes, solid_shapes
@@ -24,8 +23,9 @@ from layouts.export.usd_shapes import (
     set_inertia,
     surface,
 )
+from robot_layouts.core.writing import PARTIAL, written_whole
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix
 from robots import LayoutError
-from robots.common.writing import PARTIAL, written_whole
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from kinematics.rotations import Floats
 from layouts.export.cell import Drive, RobotSource
 from layouts.export.usd_modules import usd_modules
 from layouts.export.usd_shapes import quaternion
+from robot_layouts.kinematics.rotations import Floats
 from robots.urdf.model import ModelJoint
 
 

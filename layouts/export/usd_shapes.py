@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from kinematics.rotations import Floats, pose_matrix, quaternion_of
 from layouts.export.cell import Inertial
 from layouts.export.meshes import Drawn, Solid
 from layouts.export.usd_modules import usd_modules
+from robot_layouts.kinematics.rotations import Floats, pose_matrix, quaternion_of
 from robots import CameraMount, GripperMaterial
 
 # From a camera that looks along +x, z up, to USD's, which looks along -z, y up (wxyz).

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from kinematics.rotations import Floats, pose_matrix, transform
-from kinematics.solve import Goal, Solutions, solve
 from layouts.placement import Placement
 from layouts.validation.reach import arm_starts, sampled_poses
+from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
+from robot_layouts.kinematics.solve import Goal, Solutions, solve
 from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel
 from robots.descriptor import IDENTITY

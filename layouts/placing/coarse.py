@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinematics.rotations import Floats, pose_matrix
 from layouts.placing.arms import corners_of, unique_points
 from layouts.placing.demands import Demand
 from layouts.placing.scene import Scene
 from layouts.placing.sites import Seat, Site
 from layouts.placing.trials import AWKWARD, CRAMPED, FARTHEST, HELP, ROOM, UNREACHED, Seats
+from robot_layouts.kinematics.rotations import Floats, pose_matrix
 
 MOST_SEATS = 1500  # of one robot
 TURNS = 8  # in which a base may face, of a whole turn

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from layouts.arrangement import Arrangement
+from robot_layouts.core.bounds import shown
 from robots import LayoutError, UnknownNameError
-from robots.common.bounds import shown
 
 ANY, ALL = "any", "all"
 

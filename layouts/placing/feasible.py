@@ -14,7 +14,7 @@ from layouts.placing.scene import Scene
 from layouts.placing.sites import Seat
 from layouts.placing.trials import ALL_STEPS
 from layouts.validation.findings import length_text
-from robots.common.progress import Progress
+from robot_layouts.core.progress import Progress
 
 SEATS_TRIED = 12  # the likeliest of one arm
 STEPS = (0.1, 0.05, 0.02, 0.01)  # m; by which a base comes nearer to a target

@@ -9,8 +9,6 @@ from itertools import combinations
 
 import numpy as np
 
-from kinematics.quaternions import inverted, rotated
-from kinematics.rotations import Floats, pose_matrix
 from layouts.frames import Pose, table_outlines
 from layouts.layout import Layout
 from layouts.placement import Placement
@@ -29,6 +27,8 @@ from layouts.validation.collisions import (
 )
 from layouts.validation.reach import Workspace
 from layouts.validation.slabs import slab_hull
+from robot_layouts.kinematics.quaternions import inverted, rotated
+from robot_layouts.kinematics.rotations import Floats, pose_matrix
 from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel, load_model
 

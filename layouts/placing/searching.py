@@ -19,10 +19,10 @@ from layouts.placing.trials import Trial, Trials
 from layouts.validation.arguments import Targets, named_targets
 from layouts.validation.findings import length_text, reach_text
 from layouts.validation.report import Report
+from robot_layouts.core.bounds import checked_number, checked_whole
+from robot_layouts.core.errors import MissingPackageError
+from robot_layouts.core.progress import Progress
 from robots import LayoutError, RobotDescriptor
-from robots.common.bounds import checked_number, checked_whole
-from robots.common.errors import MissingPackageError
-from robots.common.progress import Progress
 
 BEGINNINGS = 12  # random ones of the coarse search, for each place to begin at
 MORE = 3  # times as many begin where none of the best will do

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinematics.quaternions import yaw_quaternion
-from kinematics.rotations import pose_matrix
 from layouts.frames import EDGES, Frame, Pose, resolve, table_outlines
 from layouts.placement import Placement, faced
+from robot_layouts.core.bounds import FAR, checked_number, checked_numbers, shown
+from robot_layouts.kinematics.quaternions import yaw_quaternion
+from robot_layouts.kinematics.rotations import pose_matrix
 from robots import LayoutError, RobotDescriptor, UnknownNameError
-from robots.common.bounds import FAR, checked_number, checked_numbers, shown
 from robots.descriptor import IDENTITY, Vector3
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)

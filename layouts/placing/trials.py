@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinematics.rotations import Floats
 from layouts.placing.arms import RADIAN, Arm
 from layouts.placing.demands import Demand
 from layouts.placing.scene import Scene
 from layouts.placing.sites import Seat
+from robot_layouts.kinematics.rotations import Floats
 
 UNREACHED = 100.0  # loss per m that is missing to a target
 FARTHEST = 0.3  # m; being farther from a target is no worse

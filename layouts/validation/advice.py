@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kinematics.rotations import Floats
 from layouts.arrangement import Arrangement
 from layouts.placement import Placement
 from layouts.validation.collisions import Approach, Postures, nearer_than
 from layouts.validation.findings import TargetReach, length_text
+from robot_layouts.kinematics.rotations import Floats
 
 NARROW = 0.02  # m; less clearance than this is worth a warning
 FARTHEST_MOVE = 3.0  # m; of the search for a distance that is clear

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from layouts.arrangement import Arrangement
 from layouts.frames import table_outlines
 from layouts.validation.findings import Point
+from robot_layouts.core.bounds import shown
 from robots import LayoutError
-from robots.common.bounds import shown
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]

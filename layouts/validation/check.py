@@ -8,7 +8,6 @@ from itertools import combinations
 
 import numpy as np
 
-from kinematics.rotations import Floats
 from layouts.arrangement import Arrangement
 from layouts.placement import Placement
 from layouts.validation.advice import (
@@ -42,6 +41,8 @@ from layouts.validation.findings import (
 from layouts.validation.reach import Reach, Solution, Workspace
 from layouts.validation.report import Report
 from layouts.validation.slabs import slab_hull
+from robot_layouts.core.progress import Progress
+from robot_layouts.kinematics.rotations import Floats
 from robots import (
     AssetError,
     DescriptorError,
@@ -50,7 +51,6 @@ from robots import (
     UnknownNameError,
 )
 from robots.bodies.hulls import RobotModel, load_model
-from robots.common.progress import Progress
 
 TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
 SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do not

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kinematics.rotations import Floats, pose_matrix, transform
 from layouts.frames import Pose
+from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
 from robots.bodies.depth import overlap
 from robots.bodies.hulls import Hull, RobotModel
 

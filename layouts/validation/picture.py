@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinematics.rotations import Floats
 from layouts.description import decimal, headline
 from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE, blank_figure
 from layouts.validation.findings import Clearance, Results, length_text
+from robot_layouts.core.quoting import cut
+from robot_layouts.core.writing import written_whole
+from robot_layouts.kinematics.rotations import Floats
 from robots import LayoutError
-from robots.common.quoting import cut
-from robots.common.writing import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

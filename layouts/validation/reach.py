@@ -7,10 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from kinematics.rotations import Floats, pose_matrix
-from kinematics.solve import Goal, scattered, solve
 from layouts.frames import Pose
 from layouts.placement import Placement
+from robot_layouts.kinematics.rotations import Floats, pose_matrix
+from robot_layouts.kinematics.solve import Goal, scattered, solve
 from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel
 from robots.descriptor import IDENTITY

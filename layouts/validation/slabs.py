@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinematics.rotations import Floats
+from robot_layouts.kinematics.rotations import Floats
 from robots.bodies.hulls import Hull, convex_hull
 
 

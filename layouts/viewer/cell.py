@@ -8,11 +8,11 @@ from itertools import combinations
 
 import numpy as np
 
-from kinematics.rotations import Floats
 from layouts.layout import Layout
 from layouts.validation.collisions import stand, touching
 from layouts.viewer.text import printable
 from layouts.visuals import Part, read_visuals
+from robot_layouts.kinematics.rotations import Floats
 from robots import AssetError, LayoutError
 from robots.bodies.hulls import RobotModel, load_model
 

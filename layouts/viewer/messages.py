@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import Any
 
-from robots.common.bounds import UNIT_TOLERANCE
+from robot_layouts.core.bounds import UNIT_TOLERANCE
 
 MESSAGE_BYTES = 1 << 14  # of the largest that is read; a camera's takes some hundred
 

@@ -11,12 +11,12 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from kinematics.rotations import Floats
 from layouts.viewer.cell import Cell, Contact, Motion
 from layouts.viewer.guard import is_loopback
 from layouts.viewer.scene import OVERLAYS, Scene
 from layouts.viewer.server import serving
 from layouts.viewer.text import Text, printable
+from robot_layouts.kinematics.rotations import Floats
 from robots import JointGroup
 
 PAUSE = 0.02  # s between looks at what has changed

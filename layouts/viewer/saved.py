@@ -15,8 +15,8 @@ from layouts.viewer.page import contacts_text
 from layouts.viewer.scene import Scene
 from layouts.viewer.server import ViewerError, serving
 from layouts.viewer.text import as_html
-from robots.common.commands import LOOPBACK
-from robots.common.writing import write_whole
+from robot_layouts.core.commands import LOOPBACK
+from robot_layouts.core.writing import write_whole
 
 NO_SLIDERS = "A saved page has no sliders for joints; without --html, view serves one that has."
 NOTE_STYLE = (  # above the bar that plays a motion

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from kinematics.rotations import Floats, quaternion_of
 from layouts.frames import table_outlines
 from layouts.preview import COLOURS
 from layouts.viewer.cell import Cell, Contact, Thing
 from layouts.viewer.text import node
 from layouts.visuals import Part, coarse, simplified
+from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robots.urdf.tree import link_index
 
 # What can be shown and hidden, and whether it is shown at first.

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from kinematics.quaternions import quaternion_rpy
-from robots.common.bounds import expect_unit
-from robots.common.errors import DescriptorError, UnknownNameError, UnwritableFileError
-from robots.common.paths import default_root
-from robots.common.schema import check
-from robots.common.writing import written_whole
+from robot_layouts.core.bounds import expect_unit
+from robot_layouts.core.errors import DescriptorError, UnknownNameError, UnwritableFileError
+from robot_layouts.core.paths import default_root
+from robot_layouts.core.schema import check
+from robot_layouts.core.writing import written_whole
+from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots.descriptor import IDENTITY, Quaternion, UrdfSource, Vector3
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from robot_layouts.core.errors import AssetError
+from robot_layouts.core.paths import default_root
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import INDEX_PACKAGES, SourceError
 from robots.assets.progress import listing, say, size
 from robots.assets.sources import AssetSource, HubSource, InstalledPackage, PackageWheel
 from robots.assets.store import AssetStore, FileState
-from robots.common.errors import AssetError
-from robots.common.paths import default_root
 from robots.urdf.summary import read_references
 
 

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from robots.common.errors import AssetError
+from robot_layouts.core.errors import AssetError
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from robots.common.errors import AssetError, UnknownNameError, UnreadableFileError
-from robots.common.files import read_text
-from robots.common.paths import CHECKOUT_CACHE
+from robot_layouts.core.errors import AssetError, UnknownNameError, UnreadableFileError
+from robot_layouts.core.files import read_text
+from robot_layouts.core.paths import CHECKOUT_CACHE
 
 LARGEST_FILE = 2**28  # bytes
 LARGEST_TRUSTED_FILE = 2**26  # bytes; of one whose size the manifest does not promise

@@ -7,7 +7,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
-from robots.common.errors import AssetError
+from robot_layouts.core.errors import AssetError
 
 
 class SourceError(AssetError):

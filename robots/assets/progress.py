@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 
-from robots.common.commands import is_watched, notice, printable
+from robot_layouts.core.commands import is_watched, notice, printable
 
 Advance = Callable[[int], None]
 

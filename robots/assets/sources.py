@@ -18,12 +18,12 @@ from lzma import LZMAError
 from pathlib import Path
 from typing import Any, Protocol
 
+from robot_layouts.core.errors import AssetError, UnreadableFileError
+from robot_layouts.core.files import open_regular
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import IndexPackage, SourceError, find_package
 from robots.assets.progress import Advance, download_bar, listing, say
 from robots.assets.store import AssetStore, FileState
-from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.files import open_regular
 
 ENDPOINT_VARIABLE = "HF_ENDPOINT"
 REVISION_VARIABLE = "ROBOT_LAYOUTS_HF_REVISION"

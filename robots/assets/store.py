@@ -17,13 +17,13 @@ from typing import TypedDict
 
 from filelock import FileLock, Timeout
 
+from robot_layouts.core.errors import AssetError, UnreadableFileError
+from robot_layouts.core.files import open_regular, read_json
+from robot_layouts.core.paths import ROOT_VARIABLE
+from robot_layouts.core.schema import check
+from robot_layouts.core.writing import remove, written_whole
 from robots.assets.manifest import AssetFile
 from robots.assets.progress import say
-from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.files import open_regular, read_json
-from robots.common.paths import ROOT_VARIABLE
-from robots.common.schema import check
-from robots.common.writing import remove, written_whole
 
 _LOCK, _PARTIAL, _RECORD = ".lock", ".partial", "fetched.json"
 _ABSENT = (errno.ENOENT, errno.ENOTDIR)

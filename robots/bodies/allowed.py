@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import combinations
 from pathlib import Path
 
-from robots.common.errors import UnknownNameError
+from robot_layouts.core.errors import UnknownNameError
 from robots.descriptor import RobotDescriptor
 from robots.urdf.model import UrdfModel
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinematics.rotations import Floats
+from robot_layouts.kinematics.rotations import Floats
 
 NEAR_ENOUGH = 1e-9  # m; of a face of the bodies' difference
 MOST_POINTS = 500  # of the polytope that grows within it

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from kinematics.rotations import Floats
-from kinematics.tree import Tree
+from robot_layouts.core.errors import AssetError, MissingPackageError
+from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.kinematics.tree import Tree
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
-from robots.common.errors import AssetError, MissingPackageError
 from robots.descriptor import RobotDescriptor
 from robots.urdf.cleaning.xacro_files import template_of
 from robots.urdf.mesh_files import has_volume, read_corners

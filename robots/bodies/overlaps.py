@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kinematics.rotations import Floats
+from robot_layouts.kinematics.rotations import Floats
 from robots.bodies.allowed import LinkPair, joined_pairs, rigid_groups, rigid_pairs, srdf_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls, shape_corners
 from robots.urdf.model import ModelJoint, UrdfModel

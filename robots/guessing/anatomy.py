@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from robots.common.errors import DescriptorError
+from robot_layouts.core.errors import DescriptorError
 from robots.guessing import words
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.tree import rest_poses
@@ -22,7 +22,7 @@ from robots.urdf.tree import rest_poses
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from kinematics.rotations import Floats
+    from robot_layouts.kinematics.rotations import Floats
 
 
 FARTHEST_SLIDE = 4.0  # m; a slide that goes farther is a way for a whole robot

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from kinematics.rotations import Floats
-from kinematics.tree import Tree
+from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.kinematics.tree import Tree
 from robots.guessing.hints import DriveHint
 from robots.guessing.stance import Stance
 from robots.urdf.model import ModelJoint, UrdfModel

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kinematics.rotations import Floats, inverse_pose, transform
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, transform
 from robots.bodies.hulls import Hull
 from robots.guessing import words
 from robots.guessing.anatomy import Limb

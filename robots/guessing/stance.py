@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kinematics.rotations import Floats
+from robot_layouts.kinematics.rotations import Floats
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.tree import kinematic_tree
 

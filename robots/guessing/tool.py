@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinematics.rotations import Floats, inverse_pose, transform
-from kinematics.solve import farthest
-from kinematics.tree import Tree
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, transform
+from robot_layouts.kinematics.solve import farthest
+from robot_layouts.kinematics.tree import Tree
 from robots.guessing import words
 from robots.guessing.anatomy import Limb, flies
 from robots.guessing.fingertips import Fingertips

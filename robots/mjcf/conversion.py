@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kinematics.rotations import Floats
-from robots.common.errors import UnwritableFileError
-from robots.common.paths import default_root
-from robots.common.writing import written_whole
+from robot_layouts.core.errors import UnwritableFileError
+from robot_layouts.core.paths import default_root
+from robot_layouts.core.writing import written_whole
+from robot_layouts.kinematics.rotations import Floats
 from robots.guessing.hints import Hints
 from robots.mjcf.couplings import Couplings, find_couplings
 from robots.mjcf.reading import MjcfText, Model, compiled, name_of, read_mjcf

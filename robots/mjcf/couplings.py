@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kinematics.rotations import Floats
-from robots.common.errors import AssetError
+from robot_layouts.core.errors import AssetError
+from robot_layouts.kinematics.rotations import Floats
 from robots.mjcf.reading import Model, mujoco, name_of, without_log
 from robots.mjcf.robot import JOINT, JOINT_IN_PARENT, SLIDE, TENDON, MjcfRobot, tendon_joints
 

@@ -18,9 +18,9 @@ from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from robots.common.errors import AssetError, MissingPackageError, UnreadableFileError
-from robots.common.files import read_regular
-from robots.common.quoting import shown
+from robot_layouts.core.errors import AssetError, MissingPackageError, UnreadableFileError
+from robot_layouts.core.files import read_regular
+from robot_layouts.core.quoting import shown
 from robots.urdf.mesh_files import MAX_MESH_BYTES
 from robots.urdf.paths import is_allowed
 from robots.urdf.summary import MAX_URDF_BYTES

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.common.errors import AssetError, DescriptorError
+from robot_layouts.core.errors import AssetError, DescriptorError
 from robots.guessing.hints import DriveHint
 from robots.mjcf.reading import Model, name_of
 

@@ -16,8 +16,14 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from kinematics.quaternions import quaternion_rpy
-from kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of, rotation_about
+from robot_layouts.kinematics.quaternions import quaternion_rpy
+from robot_layouts.kinematics.rotations import (
+    Floats,
+    inverse_pose,
+    pose_matrix,
+    quaternion_of,
+    rotation_about,
+)
 from robots.guessing import words
 from robots.mjcf.couplings import Couplings
 from robots.mjcf.reading import Model, name_of

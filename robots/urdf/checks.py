@@ -8,8 +8,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element
 
-from robots.common.errors import AssetError, closest_match
-from robots.common.quoting import shown
+from robot_layouts.core.errors import AssetError, closest_match
+from robot_layouts.core.quoting import shown
 from robots.urdf.model import SIZES, ModelJoint
 from robots.urdf.text import LARGEST_LENGTH, expect_numbers, numbers_of, required_numbers
 

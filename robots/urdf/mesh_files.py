@@ -16,8 +16,8 @@ from functools import lru_cache
 from typing import Any
 from urllib.parse import unquote
 
-from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.files import read_regular
+from robot_layouts.core.errors import AssetError, UnreadableFileError
+from robot_layouts.core.files import read_regular
 from robots.urdf.paths import is_allowed
 from robots.urdf.text import parse_xml
 

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from kinematics.rotations import Floats
+    from robot_layouts.kinematics.rotations import Floats
 
 # Attributes of each kind of shape, with how many numbers each has.
 SIZES: Mapping[str, Mapping[str, int]] = {

@@ -20,9 +20,9 @@ import posixpath
 from collections.abc import Callable, Iterator
 from urllib.parse import unquote
 
-from robots.common.errors import AssetError
-from robots.common.paths import default_root
-from robots.common.quoting import shown
+from robot_layouts.core.errors import AssetError
+from robot_layouts.core.paths import default_root
+from robot_layouts.core.quoting import shown
 
 Exists = Callable[[str], bool]
 

@@ -14,8 +14,8 @@ from functools import lru_cache
 from typing import Any
 from xml.etree.ElementTree import Element, tostring
 
-from kinematics.rotations import Floats, rpy_pose
-from robots.common.errors import AssetError
+from robot_layouts.core.errors import AssetError
+from robot_layouts.kinematics.rotations import Floats, rpy_pose
 from robots.urdf.checks import expect_drivable, expect_readable
 from robots.urdf.model import Inertial, ModelJoint, UrdfModel, UrdfShape
 from robots.urdf.summary import parse_urdf

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from robots.common.errors import AssetError, UnknownNameError
+from robot_layouts.core.errors import AssetError, UnknownNameError
 from robots.urdf.model import UrdfModel
 from robots.urdf.summary import parse_urdf, read_urdf
 from robots.urdf.text import numbers_of

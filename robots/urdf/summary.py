@@ -7,8 +7,8 @@ from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
-from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.files import read_regular
+from robot_layouts.core.errors import AssetError, UnreadableFileError
+from robot_layouts.core.files import read_regular
 from robots.urdf.cleaning.cleaning import Cleaned, clean, is_template
 from robots.urdf.cleaning.xacro_files import XACRO, expand, template_of
 from robots.urdf.paths import Exists, resolve

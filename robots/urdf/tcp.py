@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from kinematics.rotations import Floats
-from kinematics.tree import Tree
+from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.kinematics.tree import Tree
 from robots.parts import Vector3
 from robots.urdf.tree import link_index
 

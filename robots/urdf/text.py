@@ -9,8 +9,8 @@ from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from robots.common.errors import AssetError
-from robots.common.quoting import shown
+from robot_layouts.core.errors import AssetError
+from robot_layouts.core.quoting import shown
 
 MAX_DEPTH = 100  # elements inside one another; the deepest Collada meshes have about 20
 

@@ -1,4 +1,4 @@
-"""The tree of links that a URDF describes, as the arrays of `kinematics.tree`."""
+"""The tree of links that a URDF describes, as the arrays of `robot_layouts.kinematics.tree`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kinematics.rotations import Floats
-from kinematics.tree import FIXED, Tree
-from robots.common.errors import DescriptorError, UnknownNameError
+from robot_layouts.core.errors import DescriptorError, UnknownNameError
+from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.kinematics.tree import FIXED, Tree
 from robots.urdf.model import ModelJoint, UrdfModel
 
 

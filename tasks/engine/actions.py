@@ -10,8 +10,8 @@ import torch
 from numpy.typing import NDArray
 
 from layouts import Layout
+from robot_layouts.simulation.maths import all_finite
 from robots import ActionError, UnknownNameError
-from simulation.maths import all_finite
 from tasks.arrays import array_of
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from robot_layouts.core.bounds import checked_flag, shown
 from robots import TaskError, unknown_name_message
-from robots.common.bounds import checked_flag, shown
 
 RECONFIGURE = "reconfigure"  # option of a reset, and in its info: whether worlds are rebuilt
 ELAPSED = "elapsed_steps"  # in info: control steps since the reset

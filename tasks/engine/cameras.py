@@ -7,15 +7,15 @@ from dataclasses import replace
 from typing import Any
 
 from layouts import Layout
+from robot_layouts.core.bounds import checked_whole, shown
+from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from robots import TaskError
-from robots.common.bounds import checked_whole, shown
-from simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from tasks.native.format import observation_keys
 
 Size = tuple[int, int]
 """Width and height of a picture (pixels)."""
 
-_MOST_PIXELS = 16384  # of a side, as of `simulation.Camera`
+_MOST_PIXELS = 16384  # of a side, as of `robot_layouts.simulation.Camera`
 
 
 def cameras_of(layout: Layout, cameras: Iterable[Camera]) -> dict[str, AnyCamera]:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from layouts import Layout
+from robot_layouts.simulation import Simulation, State, World
+from robot_layouts.simulation.maths import Floats, all_finite
 from robots.descriptor import Vector3
-from simulation import Simulation, State, World
-from simulation.maths import Floats, all_finite
 from tasks.engine.finite import NotFinite
 
 LEROBOT, FILMED, ROBOMIMIC = COLUMN_MODES = ("lerobot", "lerobot+video", "robomimic")
@@ -137,7 +137,9 @@ class ColumnObserver:
             raise NotFinite
         observed: dict[str, Any] = {name: column.copy() for name, column in columns.items()}
         if self._mode == FILMED:
-            from simulation.rendering.pictures import Cameras  # loaded with the first picture
+            from robot_layouts.simulation.rendering.pictures import (
+                Cameras,  # loaded with the first picture
+            )
 
             observed[CAMERA] = Cameras(simulation, *self._view).take()
         return observed

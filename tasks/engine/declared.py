@@ -11,9 +11,15 @@ from types import FunctionType
 from typing import Any
 
 from layouts import Layout
+from robot_layouts.core.bounds import (
+    checked_flag,
+    checked_number,
+    checked_numbers,
+    checked_whole,
+    shown,
+)
+from robot_layouts.simulation import Camera, PhysicsSettings
 from robots import TaskError
-from robots.common.bounds import checked_flag, checked_number, checked_numbers, checked_whole, shown
-from simulation import Camera, PhysicsSettings
 from tasks.engine.task import DENSE_MODES, Task
 from tasks.language.bodies import Body, Table, WideTable
 from tasks.varying.randomization import Randomization

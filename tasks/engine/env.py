@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
+from robot_layouts.simulation import Simulation, State, World
+from robot_layouts.simulation.maths import Floats, all_finite
 from robots import SimulationError, TaskError
-from simulation import Simulation, State, World
-from simulation.maths import Floats, all_finite
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import (
     ELAPSED,
@@ -385,7 +385,7 @@ class TaskEnv(Remade):
         if self.scenario.render_mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
         if self._camera is None:
-            from simulation.rendering.pictures import Cameras
+            from robot_layouts.simulation.rendering.pictures import Cameras
 
             self._camera = Cameras(self.simulation, *self.task.viewpoint)
         return self._camera.take()

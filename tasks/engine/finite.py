@@ -11,10 +11,10 @@ from typing import NoReturn
 
 import numpy as np
 
+from robot_layouts.simulation import State
+from robot_layouts.simulation.maths import Array, all_finite
+from robot_layouts.simulation.readout import Lost
 from robots import SimulationError, TaskError
-from simulation import State
-from simulation.maths import Array, all_finite
-from simulation.readout import Lost
 from tasks.engine.speeds import SpeedWatch
 
 

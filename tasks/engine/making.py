@@ -7,7 +7,7 @@ from typing import TypedDict
 
 from layouts import Layout
 from layouts.placement import RobotLike
-from simulation import Camera, PhysicsSettings
+from robot_layouts.simulation import Camera, PhysicsSettings
 from tasks.varying.randomization import Randomization
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
+from robot_layouts.simulation.maths import Array, copy
 from robots import UnknownNameError
-from simulation.maths import Array, copy
 
 
 class Memory(SimpleNamespace):

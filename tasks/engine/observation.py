@@ -12,10 +12,10 @@ from gymnasium.spaces import Box, Dict, Space
 from numpy.typing import NDArray
 
 from layouts import Layout
+from robot_layouts.simulation import Camera, Simulation, State
+from robot_layouts.simulation.maths import Array, Floats, all_finite
+from robot_layouts.simulation.scene.cameras import TEXTURES, AnyCamera, RobotCamera, camera_name
 from robots import TaskError, unknown_name_message
-from simulation import Camera, Simulation, State
-from simulation.maths import Array, Floats, all_finite
-from simulation.scene.cameras import TEXTURES, AnyCamera, RobotCamera, camera_name
 from tasks.engine.cameras import Size, cameras_of, expect_apart, resized
 from tasks.engine.columns import (
     COLUMN_MODES,
@@ -32,7 +32,7 @@ from tasks.native.format import observation_keys
 from tasks.varying.noise import Noisy
 
 if TYPE_CHECKING:
-    from simulation.rendering.pictures import Observers, View
+    from robot_layouts.simulation.rendering.pictures import Observers, View
 
 PLAIN_MODES = ("state", "state_dict", "none", *COLUMN_MODES)
 SHORT_MODES = {"rgbd": "rgb+depth"}
@@ -332,7 +332,9 @@ class _CameraRig:
         cameras: Mapping[str, AnyCamera],
         textures: Sequence[str],
     ) -> None:
-        from simulation.rendering.pictures import Observers  # loaded with the first picture
+        from robot_layouts.simulation.rendering.pictures import (
+            Observers,  # loaded with the first picture
+        )
 
         self._observers: Observers = Observers(simulation, cameras, textures)
         self._rows: list[dict[str, View]] = [{}] * simulation.num_envs

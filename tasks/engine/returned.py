@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from robot_layouts.core.bounds import shown
+from robot_layouts.simulation import State
+from robot_layouts.simulation.maths import Array
 from robots import TaskError
-from robots.common.bounds import shown
-from simulation import State
-from simulation.maths import Array
 from tasks.arrays import array_of
 from tasks.engine.arguments import ELAPSED
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from layouts import Layout
+from robot_layouts.core.bounds import checked_choice, checked_flag, checked_whole, shown
+from robot_layouts.simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
+from robot_layouts.simulation.backend import SIMULATORS
+from robot_layouts.simulation.physics import substeps
 from robots import TaskError, UnknownNameError
-from robots.common.bounds import checked_choice, checked_flag, checked_whole, shown
-from simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
-from simulation.backend import SIMULATORS
-from simulation.physics import substeps
 from tasks.engine.bystanders import BYSTANDERS
 from tasks.engine.cameras import checked_size
 from tasks.engine.display import scenario_html, scenario_text

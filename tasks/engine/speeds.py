@@ -13,10 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from robot_layouts.simulation import Simulation, State
+from robot_layouts.simulation.checks.overlaps import Causes
+from robot_layouts.simulation.maths import Array
 from robots import SimulationError
-from simulation import Simulation, State
-from simulation.checks.overlaps import Causes
-from simulation.maths import Array
 
 WARNS, REFUSES = 10.0, 100.0  # times a joint's largest speed
 MOST = 3  # reports of a joint

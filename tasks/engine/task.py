@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
-from simulation import Camera, PhysicsSettings, Simulation, State, World
-from simulation.maths import Array, Floats
+from robot_layouts.simulation import Camera, PhysicsSettings, Simulation, State, World
+from robot_layouts.simulation.maths import Array, Floats
 from tasks.engine.memory import Memory
 from tasks.engine.scenario import Scenario
 from tasks.language.bodies import Declared, Table, WideTable, declared_bodies

@@ -32,7 +32,7 @@ _NOTHING = np.zeros((32, 32, 3), np.uint8)  # a frame of films where nothing is 
 class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray[Any]]):
     """What `tasks.lerobot_vec_env` gives: a `VectorTask` as LeRobot's evaluation uses it.
 
-    Every reset rebuilds the worlds, so that the episode of a seed is that of `rollouts.evaluate`,
+    Every reset rebuilds the worlds, so that the episode of a seed is that of `evaluate`,
     bit for bit, whatever was played before. An environment whose episode is over keeps its
     ``terminated``, ``truncated`` and ``is_success`` until it is reset, and earns 0.
 

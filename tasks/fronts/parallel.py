@@ -11,8 +11,8 @@ from gymnasium.spaces import Box, Space
 from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
+from robot_layouts.core.bounds import shown
 from robots import TaskError, UnknownNameError
-from robots.common.bounds import shown
 from tasks.engine.columns import COLUMN_MODES
 from tasks.engine.observation import SEEN_COLUMNS, space_of
 from tasks.fronts.gymnasium import OneEnvironment, info_row, row

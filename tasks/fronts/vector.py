@@ -15,8 +15,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from robot_layouts.core.bounds import checked_whole
 from robots import SimulationError, TaskError, UnknownNameError, unknown_name_message
-from robots.common.bounds import checked_whole
 from tasks.engine.actions import ActionReader
 from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
 from tasks.engine.env import built_layout

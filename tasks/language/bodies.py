@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 from math import cos, isfinite, sin
 from typing import ClassVar, Literal, TypeAlias, TypedDict
 
-from kinematics.quaternions import multiplied
 from layouts import Layout
+from robot_layouts.core.schema import check_fields
+from robot_layouts.kinematics.quaternions import multiplied
+from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_table
+from robot_layouts.simulation.scene.shapes import Color, Coordinate, Density, Length, Lengths, Place
+from robot_layouts.simulation.tabletop import TABLE_OUTLINE
+from robot_layouts.simulation.world import BodyKind
 from robots import TaskError
-from robots.common.schema import check_fields
 from robots.descriptor import IDENTITY, Quaternion
-from simulation import Box, Friction, Shape, Sphere, World, add_table
-from simulation.scene.shapes import Color, Coordinate, Density, Length, Lengths, Place
-from simulation.tabletop import TABLE_OUTLINE
-from simulation.world import BodyKind
 from tasks.language.props import (
     FACE_UP,
     GREEN,

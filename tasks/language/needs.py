@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from robot_layouts.core.bounds import checked_flag, checked_number
 from robots import RobotDescriptor, TaskError
 from robots.action_split import JointGroup, is_gripper
-from robots.common.bounds import checked_flag, checked_number
 
 HOLD, ACT = "hold", "act"  # what robots do that have no place in a task
 LARGEST = 100.0  # m

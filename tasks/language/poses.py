@@ -1,7 +1,7 @@
 """Products, inverses and angles of poses, in the order of operations of native's ``Pose``.
 
 Poses are position (m) and quaternion (wxyz), float32, (N, 7). Native's order decides the last bits
-of observations and rewards, so these stand apart from `kinematics.rotations`.
+of observations and rewards, so these stand apart from `robot_layouts.kinematics.rotations`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from simulation.maths import (
+from robot_layouts.simulation.maths import (
     Floats,
     added,
     arctan2,

@@ -7,9 +7,9 @@ from math import cos, pi, sin
 import numpy as np
 
 from layouts import Layout
+from robot_layouts.simulation import Box, Cylinder, Plane, Shape, Sphere, World
+from robot_layouts.simulation.scene.shapes import Color
 from robots.descriptor import Vector3
-from simulation import Box, Cylinder, Plane, Shape, Sphere, World
-from simulation.scene.shapes import Color
 
 RED: Color = (1.0, 0.0, 0.0, 1.0)
 GREEN: Color = (0.0, 1.0, 0.0, 1.0)

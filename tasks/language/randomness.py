@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
+from robot_layouts.simulation.maths import sqrt
 from robots import TaskError
-from simulation.maths import sqrt
 from tasks.varying.streams import Stream
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from simulation import State
-from simulation.maths import Flags, Floats, stack, tanh, where
-from simulation.maths import closeness as close
+from robot_layouts.simulation import State
+from robot_layouts.simulation.maths import Flags, Floats, stack, tanh, where
+from robot_layouts.simulation.maths import closeness as close
 
 
 def closeness(*distances: Floats) -> Sequence[Floats]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from simulation import State
-from simulation.maths import Flags, Floats, copy, norm, rounded
+from robot_layouts.simulation import State
+from robot_layouts.simulation.maths import Flags, Floats, copy, norm, rounded
 
 # The same in StackCube, StackPyramid and PlaceSphere of mani_skill 3.0.1
 HEIGHT_TOLERANCE = 0.005  # m

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
-from simulation import Simulation
-from simulation.control.modes import ModeController, Remembered
-from simulation.maths import Floats
-from simulation.readout import ReadoutIndex
+from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.control.modes import ModeController, Remembered
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.readout import ReadoutIndex
 
 CONTROLLER = "controller"  # native's group of a state dict, and of what a robot observes of itself
 _JOINTS = "target_qpos"

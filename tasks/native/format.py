@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
+from robot_layouts.core.bounds import FAR, expect_unit, shown
+from robot_layouts.simulation import Simulation, State
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.readout import ReadoutIndex
 from robots import TaskError, unknown_name_message
-from robots.common.bounds import FAR, expect_unit, shown
-from simulation import Simulation, State
-from simulation.maths import Floats
-from simulation.readout import ReadoutIndex
 from tasks.arrays import array_of
 from tasks.native import controllers
 from tasks.native.controllers import CONTROLLER
@@ -224,7 +224,7 @@ def write_state_dict(
 
     Not exact even in native: PhysX's solver memory is no part of it.
 
-    Numbers must be finite and at most `robots.common.bounds.FAR`, quaternions of length 1, and
+    Numbers must be finite and at most `robot_layouts.core.bounds.FAR`, quaternions of length 1, and
     joints within a full turn (rad; or 2π m) of their limits: joint noise and contacts push them a
     little beyond. Targets of control modes that are left out stay as they are.
 

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from simulation.maths import Array, Floats, by_torch
+from robot_layouts.simulation.maths import Array, Floats, by_torch
 
 POINTS_PER_SIDE = 51  # a corner and what follows it
 

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from simulation.maths import Array, Floats, arccos, cos, sin, where, zeros
+from robot_layouts.simulation.maths import Array, Floats, arccos, cos, sin, where, zeros
 
 RESOLUTION = 64  # pixels along each side of the picture
 PICTURE_HALF_WIDTH = 0.15  # m

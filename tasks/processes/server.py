@@ -12,7 +12,7 @@ from importlib import import_module
 
 from tasks.processes.start import SERVER_OF, end_with_parent
 
-LOADED = ("tasks.fronts.workers", "simulation")
+LOADED = ("tasks.fronts.workers", "robot_layouts.simulation")
 
 if os.environ.get(SERVER_OF) == str(os.getppid()):
     end_with_parent()

@@ -12,8 +12,8 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+from robot_layouts.core.rooms import PACKAGES
 from robots import RobotLayoutsError
-from robots.common.rooms import ROOMS
 from tasks.processes.start import WorkerError
 
 _CHECKOUT = Path(__file__).parents[2]
@@ -131,7 +131,7 @@ def _line(frames: Sequence[traceback.FrameSummary]) -> str:
 
 def _is_users(file: str) -> bool:
     path = Path(file)
-    library = any(path.is_relative_to(_CHECKOUT / room) for room in ROOMS)
+    library = any(path.is_relative_to(_CHECKOUT / room) for room in PACKAGES)
     return not (library or is_installed(path) or file.startswith("<frozen "))
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import inf, pi
 from typing import Any, ClassVar
 
+from robot_layouts.core.bounds import shown
 from robots import TaskError
-from robots.common.bounds import shown
 from tasks.varying.distractors import Distractors
 from tasks.varying.distributions import Distribution
 from tasks.varying.groups import Group, Limits

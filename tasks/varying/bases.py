@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from kinematics.quaternions import multiplied, yaw_quaternion
 from layouts import Layout
+from robot_layouts.kinematics.quaternions import multiplied, yaw_quaternion
 
 
 def shifted(layout: Layout, shifts: Mapping[str, Mapping[str, float]]) -> Layout:

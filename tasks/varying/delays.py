@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from simulation.maths import Floats
+from robot_layouts.simulation.maths import Floats
 
 
 class ActionDelay:

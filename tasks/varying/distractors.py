@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from math import cos, hypot, inf, pi, sin
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
+from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole, shown
+from robot_layouts.simulation import Box, Cylinder, Shape, Sphere, World
+from robot_layouts.simulation.world import BodyKind
 from robots import TaskError, UnknownNameError
-from robots.common.bounds import checked_choice, checked_number, checked_whole, shown
 from robots.descriptor import Vector3
-from simulation import Box, Cylinder, Shape, Sphere, World
-from simulation.world import BodyKind
 from tasks.varying.distributions import Uniform, as_whole
 from tasks.varying.groups import Declared, Group, Limits
 from tasks.varying.looks import TONES

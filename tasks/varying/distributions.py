@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Any
 
+from robot_layouts.core.bounds import FAR, as_float, checked_number, checked_whole, shown
 from robots import TaskError, UnknownNameError
-from robots.common.bounds import FAR, as_float, checked_number, checked_whole, shown
 
 _STANDARD = NormalDist()
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import yaml
 
+from robot_layouts.core.bounds import shown
+from robot_layouts.core.files import read_text
+from robot_layouts.core.writing import write_whole
+from robot_layouts.core.yaml_text import WordLoader, compose
 from robots import TaskError, UnreadableFileError
-from robots.common.bounds import shown
-from robots.common.files import read_text
-from robots.common.writing import write_whole
-from robots.common.yaml_text import WordLoader, compose
 
 MAX_LENGTH = 1 << 18  # bytes
 MAX_DEPTH = 16  # of mappings and lists inside one another

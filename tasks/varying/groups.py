@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, ClassVar
 
+from robot_layouts.core.bounds import shown
 from robots import TaskError, UnknownNameError
-from robots.common.bounds import shown
 from tasks.varying.distributions import Distribution, Fixed, Whole, read_distribution
 
 Declared = Distribution | float | Mapping[str, Any] | None

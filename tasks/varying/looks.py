@@ -8,11 +8,10 @@ from math import inf
 from typing import Any, ClassVar
 
 from layouts import Layout
-from robots import TaskError, UnknownNameError
-from robots.common.bounds import shown
-from simulation import Camera, Simulation
-from simulation.scene.cameras import AnyCamera, RobotCamera, camera_name
-from simulation.scene.looks import (
+from robot_layouts.core.bounds import shown
+from robot_layouts.simulation import Camera, Simulation
+from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, camera_name
+from robot_layouts.simulation.scene.looks import (
     LIGHTS,
     PATTERNS,
     Glow,
@@ -21,7 +20,8 @@ from simulation.scene.looks import (
     Pattern,
     Shift,
 )
-from simulation.scene.parts import Part
+from robot_layouts.simulation.scene.parts import Part
+from robots import TaskError, UnknownNameError
 from tasks.varying.distributions import Choice, Distribution, LogUniform, Whole
 from tasks.varying.groups import Declared, Group, Limits
 from tasks.varying.targets import linked_parts

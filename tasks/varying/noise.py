@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from robot_layouts.simulation.maths import Array, Floats
 from robots import UnknownNameError
-from simulation.maths import Array, Floats
 from tasks.varying.distributions import Distribution
 from tasks.varying.streams import Stream
 from tasks.varying.targets import Target, matching

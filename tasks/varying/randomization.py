@@ -8,8 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from robot_layouts.core.bounds import shown
 from robots import RobotLayoutsError, TaskError, UnknownNameError
-from robots.common.bounds import shown
 from tasks.varying.axes import AXES, Shift
 from tasks.varying.distractors import Distractors
 from tasks.varying.distributions import Distribution

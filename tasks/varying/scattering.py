@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from simulation import Box, Cylinder, Shape, Simulation, Sphere, State, World
-from simulation.maths import Floats
-from simulation.scene.looks import Paint
-from simulation.scene.parts import Part
-from simulation.scene.shapes import Capsule
-from simulation.scene.variation import Variation
-from simulation.world import Body
+from robot_layouts.simulation import Box, Cylinder, Shape, Simulation, Sphere, State, World
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.scene.looks import Paint
+from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.scene.shapes import Capsule
+from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.world import Body
 from tasks.varying.distractors import Distractor, Distractors, Rectangle, waiting
 from tasks.varying.distributions import Distribution, Uniform
 from tasks.varying.streams import Stream

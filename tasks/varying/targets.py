@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple, TypeVar
 
+from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.scene.shapes import SIZED
 from robots import UnknownNameError
-from simulation import Simulation
-from simulation.scene.parts import Part
-from simulation.scene.shapes import SIZED
 
 Thing = TypeVar("Thing")
 

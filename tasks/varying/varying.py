@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
+from robot_layouts.simulation import Camera, Simulation, State, World
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.scene.variation import Variation
 from robots.descriptor import Vector3
-from simulation import Camera, Simulation, State, World
-from simulation.maths import Floats
-from simulation.scene.variation import Variation
 from tasks.varying import targets as find
 from tasks.varying.axes import AXES
 from tasks.varying.bases import shifted

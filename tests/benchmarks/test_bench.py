@@ -21,8 +21,8 @@ from benchmarks.bench.run import BENCHMARKS, BESIDE_NATIVE
 from benchmarks.bench.vectors import Helpers
 from benchmarks.bench.worlds import crowd, make_pile
 from parity.native import make_native, native_action
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import MissingPackageError, SimulationError
-from simulation.sapien3.backend import worlds_below
 from tests.native import NATIVE
 from tests.quick import quick_cases
 

@@ -13,8 +13,8 @@ from benchmarks.experts import TASKS
 from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
 from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
-from rollouts.receipts import Receipt
-from rollouts.receipts.provenance import describe_task
+from robot_layouts.data.receipts import Receipt
+from robot_layouts.data.receipts.provenance import describe_task
 from tasks import get_task_class
 
 ROOT = DOCS.parent

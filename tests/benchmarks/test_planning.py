@@ -17,8 +17,8 @@ from benchmarks.planning import (
     table_of,
 )
 from layouts import face_to_face
-from motion import Motion
-from motion.collision.cell import Cell
+from robot_layouts.motion import Motion
+from robot_layouts.motion.collision.cell import Cell
 from robots import RobotRegistry
 from tests.three_links import arm, save
 
@@ -132,7 +132,7 @@ def test_a_page_shows_the_record(tmp_path):
     words = ["planning", "--cells", "0", "--out", str(record), "--page", str(path)]
     assert main(words) == 0
     text = path.read_text()
-    assert "1 queries to `motion.plan` in 1 random" in text
+    assert "1 queries to `robot_layouts.motion.plan` in 1 random" in text
     assert (
         "Of the 2 arms, 1 were made by\n`RobotDescriptor.from_urdf` from URDFs of pybullet" in text
     )

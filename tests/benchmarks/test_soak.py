@@ -26,8 +26,8 @@ from benchmarks.soak import (
 )
 from robots import TaskError
 from tasks import list_tasks, register_task
+from tests.data import leaking_tasks
 from tests.fresh_process import in_fresh_process
-from tests.rollouts import leaking_tasks
 
 SMALL = ["--envs", "2", "--workers", "1", "--steps", "1"]
 

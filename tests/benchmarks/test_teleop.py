@@ -43,7 +43,7 @@ def test_more_drags_than_the_page_remembers_are_refused(capsys):
 def test_a_command_without_a_page_says_why():
     with (
         pytest.raises(ViewerError, match=r"teleop NoTask-v1` serves no page: .*NoTask-v1"),
-        teleop.served("rollouts", "teleop", "NoTask-v1"),
+        teleop.served("robot_layouts", "teleop", "NoTask-v1"),
     ):
         pass
 

@@ -19,8 +19,8 @@ import pytest
 from benchmarks.__main__ import PROGRAM as BENCHMARKS
 from parity.__main__ import PROGRAM as PARITY
 from robot_layouts.__main__ import PROGRAM
-from robots.common.cli import Call
-from robots.common.rooms import ROOMS
+from robot_layouts.core.cli import Call
+from robot_layouts.core.rooms import PACKAGES
 from tests.docs.blocks import ROOT
 from tests.outside.lab import tomllib
 
@@ -108,7 +108,7 @@ def _understand(line: Sequence[str]) -> None:
 def _of_module(name: str, words: Sequence[str]) -> None:
     if name in TOOLS:
         TOOLS[name].parse(words)
-    elif name.partition(".")[0] in ROOMS:
+    elif name.partition(".")[0] in PACKAGES:
         found = find_spec(name)
         if found is None:
             raise LookupError(f"there is no module {name}")
@@ -217,7 +217,7 @@ make = "robot-layouts demo"
             ("robot-layouts evaluate expert --task X-v1", "unrecognized arguments: expert"),
             ("A=1 robot-layouts record --task X-v1", "required: --episodes, --out"),
             ("robot-layouts portable robot-layouts demo --sedes 1", "Did you mean --seeds"),
-            ("python -m rollouts demo --sedes 1", "unrecognized arguments: --sedes"),
+            ("python -m robot_layouts demo --sedes 1", "unrecognized arguments: --sedes"),
             ("python -m tasks lost", "Did you mean 'list'"),
             ("python -m benchmarks placings", "Did you mean 'placing'"),
             ("python -m parity compare --evry", "unrecognized arguments: --evry"),

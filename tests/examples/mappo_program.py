@@ -13,8 +13,8 @@ from torchrl.envs import check_env_specs
 from torchrl_arms import OBSERVATION, Arms
 
 import tasks
+from robot_layouts.data import evaluate
 from robots import TaskError
-from rollouts import evaluate
 
 TASK = "TwoRobotPickCube-v1"
 MAKING = {"control_mode": "pd_ee_delta_pos"}

@@ -17,9 +17,9 @@ import torch
 pytest.importorskip("matplotlib")
 
 import tasks
-from kinematics.rotations import multiply
-from rollouts import evaluate
-from rollouts.reading.recording import Recording
+from robot_layouts.data import evaluate
+from robot_layouts.data.reading.recording import Recording
+from robot_layouts.kinematics.rotations import multiply
 
 ROOT = Path(__file__).parent.parent.parent
 EXAMPLE = ROOT / "examples" / "imitate.py"

@@ -13,9 +13,9 @@ import torch
 pytest.importorskip("matplotlib")
 
 import tasks
+from robot_layouts.data import evaluate, record
+from robot_layouts.data.reading.recording import Recording
 from robots import TaskError
-from rollouts import evaluate, record
-from rollouts.reading.recording import Recording
 from tests.examples.learning import examples, finish, start
 
 __all__ = ["examples"]

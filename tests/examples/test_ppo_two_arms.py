@@ -16,9 +16,9 @@ pytest.importorskip("stable_baselines3")
 pytest.importorskip("matplotlib")
 
 import tasks
+from robot_layouts.data import evaluate
+from robot_layouts.data.sources.policies import find_policy
 from robots import TaskError
-from rollouts import evaluate
-from rollouts.sources.policies import find_policy
 from tests.examples.learning import (
     assert_same,
     examples,

@@ -11,8 +11,8 @@ import gymnasium
 import numpy as np
 import pytest
 
-from experts.registry import EXPERTS
 from layouts import Layout, Placement, face_to_face
+from robot_layouts.experts.registry import EXPERTS
 from robots import RobotRegistry
 from tasks import Area, Cuboid
 from tasks.registry import TASKS

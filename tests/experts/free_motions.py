@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from layouts import Layout, face_to_face
-from motion.motion import Motion
+from robot_layouts.motion.motion import Motion
 from tasks import MultiRobotTask
 
 

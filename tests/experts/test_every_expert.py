@@ -5,11 +5,11 @@ import pytest
 import torch
 
 import tasks
-from experts import find_expert, list_experts
-from experts.rehearsal import rehearsed
 from parity.native import make_native, native_action
+from robot_layouts.experts import find_expert, list_experts
+from robot_layouts.experts.rehearsal import rehearsed
+from tests.data.expert_plays import REBUILT, episode, plan, same_episodes, seeds, task
 from tests.quick import quick_cases
-from tests.rollouts.expert_plays import REBUILT, episode, plan, same_episodes, seeds, task
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert, list_experts, register_expert
-from experts.registry import EXPERTS
 from layouts import face_to_face
 from parity.native import make_native, native_action
+from robot_layouts.experts import find_expert, list_experts, register_expert
+from robot_layouts.experts.registry import EXPERTS
 from robots import TaskError, UnknownNameError
 from tasks.episode import play
+from tests.data.hand_overs import TASK, plan, task
 from tests.quick import quick_cases
-from tests.rollouts.hand_overs import TASK, plan, task
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experts import Follower, follow
 from layouts import face_to_face
-from motion.model.obstacles import Held, box
-from motion.motion import Motion
+from robot_layouts.experts import Follower, follow
+from robot_layouts.motion.model.obstacles import Held, box
+from robot_layouts.motion.motion import Motion
 from robots import CONTROL_MODES, TaskError, UnknownNameError
 from tests.experts.free_motions import FreeRobots, free_robots, swing
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 import tasks
-from experts import find_expert
-from experts.script import Scene
 from layouts import Layout
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.script import Scene
 from robots import TaskError
 from tasks.episode import play
 from tests.tasks.test_relay import mixed, three_kinds

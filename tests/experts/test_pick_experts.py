@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert
-from experts.grasps import cube_grips, held_at, is_near
-from experts.rehearsal import Rehearsal, first_success
-from experts.script import Scene, Waypoint
-from kinematics.rotations import rotate
 from layouts import Layout, Placement
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.grasps import cube_grips, held_at, is_near
+from robot_layouts.experts.rehearsal import Rehearsal, first_success
+from robot_layouts.experts.script import Scene, Waypoint
+from robot_layouts.kinematics.rotations import rotate
 from robots import RobotRegistry, TaskError
 from tasks.episode import play
-from tests.rollouts.expert_plays import plan, task
+from tests.data.expert_plays import plan, task
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
 

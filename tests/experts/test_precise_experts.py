@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert
-from experts.maniskill import push_t as push_t_module
-from kinematics.rotations import rotate
 from layouts import Layout, Placement
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.maniskill import push_t as push_t_module
+from robot_layouts.kinematics.rotations import rotate
 from robots import TaskError
 from tasks.episode import play
-from tests.rollouts.expert_plays import episode, plan, seeds, task
+from tests.data.expert_plays import episode, plan, seeds, task
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import experts
 import tasks
-from experts import (
+from robot_layouts import experts
+from robot_layouts.experts import (
     Waypoint,
     cube_grips,
     find_expert,
@@ -16,8 +16,8 @@ from experts import (
     pick,
     rehearse,
 )
-from experts.tips import gripper_turn
-from kinematics.rotations import rotate
+from robot_layouts.experts.tips import gripper_turn
+from robot_layouts.kinematics.rotations import rotate
 from robots import ActionError, RobotRegistry
 
 

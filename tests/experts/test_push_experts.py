@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert
-from kinematics.rotations import rotate
 from layouts import Layout, Placement
+from robot_layouts.experts import find_expert
+from robot_layouts.kinematics.rotations import rotate
 from robots import TaskError
 from tasks.episode import play
-from tests.rollouts.expert_plays import REBUILT, episode, path, plan
+from tests.data.expert_plays import REBUILT, episode, path, plan
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
 

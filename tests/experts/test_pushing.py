@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import tasks
-from experts.geometry import gripper_facing, yaw_of
-from experts.maniskill.push_plans import PushPlanner, Situation
-from experts.maniskill.push_t import BODY, contacts, touches
-from experts.maniskill.sliding import SlidingBody, to_body, to_world
-from experts.rehearsal import Rehearsal
-from experts.script import Scene, Waypoint
+from robot_layouts.experts.geometry import gripper_facing, yaw_of
+from robot_layouts.experts.maniskill.push_plans import PushPlanner, Situation
+from robot_layouts.experts.maniskill.push_t import BODY, contacts, touches
+from robot_layouts.experts.maniskill.sliding import SlidingBody, to_body, to_world
+from robot_layouts.experts.rehearsal import Rehearsal
+from robot_layouts.experts.script import Scene, Waypoint
 
 DISC = SlidingBody(centre=(0.0, 0.0), torque_arm=0.05, tip_radius=0.01)
 FROM_LEFT = np.array([[-0.1, 0.0, -1.0, 0.0]])  # pushes along x

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert
-from experts.geometry import gripper_facing, nearest_quarter_turn, turn, yaw_of
-from experts.rehearsal import (
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.geometry import gripper_facing, nearest_quarter_turn, turn, yaw_of
+from robot_layouts.experts.rehearsal import (
     Attempt,
     Rehearsal,
     first_success,
@@ -21,11 +21,11 @@ from experts.rehearsal import (
     rehearsing,
     search,
 )
-from experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
-from kinematics.rotations import rotate
+from robot_layouts.experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
+from robot_layouts.kinematics.rotations import rotate
 from robots import TaskError, UnknownNameError
 from tasks.episode import play
-from tests.rollouts.expert_plays import same_episodes
+from tests.data.expert_plays import same_episodes
 from tests.tasks.varying.declarations import TASK, VARIED
 
 FORWARD, DOWN = 0.0, gripper_facing(0.0, 0.0)

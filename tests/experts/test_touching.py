@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experts.touching import ArmWatch
 from layouts import face_to_face
+from robot_layouts.experts.touching import ArmWatch
 from robots import MissingPackageError
 from tasks import Randomization, get_task_class
 

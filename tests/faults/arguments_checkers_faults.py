@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from robots import TaskError
-from robots.common.bounds import (
+from robot_layouts.core.bounds import (
     checked_choice,
     checked_flag,
     checked_number,
     checked_numbers,
     checked_whole,
 )
+from robots import TaskError
 from tests.faults.fault import Fault
 
 AREA = "arguments"

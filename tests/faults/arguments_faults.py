@@ -135,7 +135,7 @@ def _make_two(folder: Path) -> None:
 
 
 def _declare(kind: str, name: str, value: Any, folder: Path) -> None:
-    import simulation
+    from robot_layouts import simulation
 
     needed = {"eye": (0.0, 0.0, 0.1), "target": (0.0, 0.0, 0.0)} if kind == "Camera" else {}
     if (kind, name, value) == ("Camera", "eye", needed.get("eye")):

@@ -269,7 +269,7 @@ def _lost(obs_mode: str, folder: Path) -> None:
 
 def _lose(task: Any) -> None:
     """Push a body so that physics cannot follow."""
-    from simulation.sapien3.backend import worlds_below
+    from robot_layouts.simulation.sapien3.backend import worlds_below
 
     cube = worlds_below(task.simulation)[1].bodies["cube"].component
     cube.set_linear_velocity([math.inf, 0.0, 0.0])

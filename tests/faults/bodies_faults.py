@@ -68,8 +68,8 @@ def _wrong() -> Iterator[tuple[str, dict[str, Any], str, tuple[Any, ...]]]:
 
 
 def _declare(name: str, arguments: dict[str, Any], _: Path) -> None:
+    from robot_layouts.simulation.scene import shapes
     from robots import RobotLayoutsError
-    from simulation.scene import shapes
     from tasks.language import bodies
 
     make: Callable[..., Any] = getattr(bodies, name, None) or getattr(shapes, name)

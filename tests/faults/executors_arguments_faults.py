@@ -71,7 +71,7 @@ def _wrong_arguments() -> Iterator[Fault]:
 
 
 def _command(words: list[str], folder: Path) -> None:
-    run_command("rollouts", "evaluate", f"--task={TASK}", "--episodes=1", *words)
+    run_command("robot_layouts", "evaluate", f"--task={TASK}", "--episodes=1", *words)
 
 
 # -- policies -------------------------------------------------------------------------------------

@@ -43,20 +43,20 @@ def _deaths() -> Iterator[Fault]:
 
 
 def _plays_again(what: str, folder: Path, during: str = "play") -> str:
-    from rollouts.playing.executor import ProcessExecutor
+    from robot_layouts.data.playing.executor import ProcessExecutor
 
     executor = ProcessExecutor(1, episode_timeout=1.0)
     return expect_squares(executor, Mischief(folder, what, during))
 
 
 def _naps(folder: Path) -> str:
-    from rollouts.playing.executor import ProcessExecutor
+    from robot_layouts.data.playing.executor import ProcessExecutor
 
     return expect_squares(ProcessExecutor(1), Mischief(folder, "nap", "play"), deaths=0)
 
 
 def _gives_up(what: str, folder: Path, during: str) -> None:
-    from rollouts.playing.executor import ProcessExecutor
+    from robot_layouts.data.playing.executor import ProcessExecutor
 
     executor = ProcessExecutor(1, attempts=2, episode_timeout=0.3)
     for event in executor.run(Mischief(folder, what, during, again=True), range(3)):
@@ -87,8 +87,8 @@ def _program(text: str, folder: Path) -> str:
 _OPENING = """
 import json, multiprocessing, os, resource, signal, sys, time
 from robots import RobotLayoutsError
-from rollouts.playing.executor import ProcessExecutor
-from tests.rollouts.plays import Play
+from robot_layouts.data.playing.executor import ProcessExecutor
+from tests.data.plays import Play
 
 def tell(*words):
     print(json.dumps(words), flush=True)
@@ -158,7 +158,7 @@ if __name__ == "__main__":
 if __name__ == "__main__":
     import subprocess
     text = "def play():\\n    return str\\n"
-    text += "from rollouts.playing.executor import ProcessExecutor\\n"
+    text += "from robot_layouts.data.playing.executor import ProcessExecutor\\n"
     text += "next(ProcessExecutor(1).run(play, [0]))\\n"
     done = subprocess.run([sys.executable], input=text, capture_output=True, text=True)
     assert done.stderr.count("Traceback") == 1, done.stderr
@@ -173,8 +173,8 @@ def follow(event):
     raise LookupError("of the caller")
 
 if __name__ == "__main__":
-    from rollouts import evaluate
-    from tests.rollouts.policies import still
+    from robot_layouts.data import evaluate
+    from tests.data.policies import still
     try:
         evaluate(still, "PushT-v1", range(4), workers=2, on_event=follow)
     except LookupError as error:
@@ -225,7 +225,7 @@ def _with_executor(what: str, folder: Path) -> None:
 
 
 def _recording_with_forgetful_executor(folder: Path) -> None:
-    from rollouts.reading.recording import Recording
+    from robot_layouts.data.reading.recording import Recording
 
     executor = Nobody()
     executor.what = "forgets one"

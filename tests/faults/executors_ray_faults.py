@@ -70,7 +70,7 @@ def _clusters() -> Iterator[Fault]:
 @functools.cache
 def _cluster() -> Any:
     """Return a cluster of one node with a CPU, which lives as long as this process."""
-    from tests.rollouts.clusters import running_cluster
+    from tests.data.clusters import running_cluster
 
     manager = running_cluster()
     nodes = manager.__enter__()
@@ -80,7 +80,7 @@ def _cluster() -> Any:
 
 
 def _on_ray(**more: Any) -> Any:
-    from rollouts.playing.ray_executor import RayExecutor
+    from robot_layouts.data.playing.ray_executor import RayExecutor
 
     modules = ["tests.faults.players"]
     return RayExecutor(_cluster().address, 1, modules=modules, episode_timeout=2.0, **more)
@@ -105,7 +105,7 @@ def _unloadable_on_ray(folder: Path) -> None:
 
 
 def _join(address: str) -> None:
-    from rollouts.playing.ray_executor import RayExecutor
+    from robot_layouts.data.playing.ray_executor import RayExecutor
 
     next(RayExecutor(address).run(Mischief(Path(), "", ""), [0]))
 
@@ -117,7 +117,7 @@ def _stale_environment(folder: Path) -> None:
 
 def _port_that_is_no_head(answer: bytes, folder: Path) -> None:
     with (
-        patch("rollouts.playing.ray_cluster._JOIN_SECONDS", SILENT_SECONDS),
+        patch("robot_layouts.data.playing.ray_cluster._JOIN_SECONDS", SILENT_SECONDS),
         _answering_port(answer) as port,
     ):
         _join(f"127.0.0.77:{port}")

@@ -11,10 +11,10 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from robot_layouts.core.paths import default_root
 from robots.assets.fetching import ensure
 from robots.assets.sources import LocalCopy
 from robots.assets.store import AssetStore, FileState
-from robots.common.paths import default_root
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.tiny_files import (
     CONTENTS,

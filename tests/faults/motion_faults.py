@@ -139,47 +139,47 @@ def _cell() -> Any:
 
 @functools.cache
 def _motion() -> Any:
-    from motion import TcpGoal, plan
+    from robot_layouts.motion import TcpGoal, plan
 
     return plan(_cell(), goals={"left": TcpGoal(GOAL)})
 
 
 def _plan(given: dict[str, Any], folder: Path) -> None:
-    from motion import TcpGoal, plan
+    from robot_layouts.motion import TcpGoal, plan
 
     plan(**{"layout": _cell(), "goals": {"left": TcpGoal(GOAL)}, **given})
 
 
 def _goal(name: str, *given: Any) -> None:
-    import motion
+    from robot_layouts import motion
 
     goal = getattr(motion, name)(*given[:-1])
     motion.plan(_cell(), goals={"left": goal})
 
 
 def _make(name: str, *given: Any) -> None:
-    from motion.model import obstacles
+    from robot_layouts.motion.model import obstacles
 
     getattr(obstacles, name)("wall", *given[:-1])
 
 
 def _called(name: Any, folder: Path) -> None:
-    from motion.collision.cell import Cell
-    from motion.model.obstacles import box
+    from robot_layouts.motion.collision.cell import Cell
+    from robot_layouts.motion.model.obstacles import box
 
     Cell(_cell(), [box(name, (0.1, 0.1, 0.1))])
 
 
 def _obstacle(given: dict[str, Any], folder: Path) -> None:
-    from motion.collision.cell import Cell
-    from motion.model.obstacles import Obstacle, box
+    from robot_layouts.motion.collision.cell import Cell
+    from robot_layouts.motion.model.obstacles import Obstacle, box
 
     shapes = box("wall", (0.1, 0.1, 0.1)).shapes
     Cell(_cell(), [Obstacle(**{"name": "wall", "shapes": shapes, **given})])
 
 
 def _track(times: Any, poses: Any, folder: Path) -> None:
-    from motion.model.obstacles import Track
+    from robot_layouts.motion.model.obstacles import Track
 
     Track(times, poses)
 
@@ -207,7 +207,7 @@ SPOILT_FILES: dict[str, Callable[[str], str | bytes]] = {
 
 
 def _load(spoil: Callable[[str], str | bytes], folder: Path) -> None:
-    from motion import Motion
+    from robot_layouts.motion import Motion
 
     file = folder / "motion.json"
     _motion().save(file)
@@ -257,7 +257,7 @@ def _swinging(document: dict[str, Any]) -> None:
 
 
 def _certified(change: Callable[[dict[str, Any]], None], folder: Path) -> str:
-    from motion import Motion
+    from robot_layouts.motion import Motion
 
     file = folder / "motion.json"
     _motion().save(file)
@@ -275,7 +275,7 @@ def _stepped(step: float, folder: Path) -> None:
 def _long(folder: Path) -> None:
     from dataclasses import replace
 
-    from motion.model.obstacles import Track, box
+    from robot_layouts.motion.model.obstacles import Track, box
 
     track = Track(np.array([0.0, 1.0]), np.array([_far(0.0), _far(1e6)]))
     replace(_motion(), obstacles=(box("comet", (0.1, 0.1, 0.1)).moved(track),)).certify()
@@ -284,7 +284,7 @@ def _long(folder: Path) -> None:
 def _crowded(folder: Path) -> None:
     from dataclasses import replace
 
-    from motion.model.obstacles import Obstacle, box
+    from robot_layouts.motion.model.obstacles import Obstacle, box
 
     crate = Obstacle("crate", box("crate", (0.1, 0.1, 0.1)).shapes * 2001)
     replace(_motion(), obstacles=(crate,)).certify()

@@ -25,7 +25,7 @@ def fault_of(what: str, run: Callable[..., None], **arguments: Any) -> Fault:
 
 def evaluated(policy: Any = len, seeds: Any = (0,), workers: Any = 1, **arguments: Any) -> None:
     """Evaluate a policy."""
-    from rollouts import evaluate
+    from robot_layouts.data import evaluate
 
     if arguments.get("executor") is None or workers is not None:
         arguments["workers"] = workers
@@ -36,23 +36,23 @@ def recorded(
     seeds: Any = (0,), folder: Path = Path("/nowhere"), workers: Any = 1, **arguments: Any
 ) -> None:
     """Record episodes of an expert that moves at random."""
-    from rollouts.recording.record import record
-    from tests.rollouts.plays import at_random
+    from robot_layouts.data.recording.record import record
+    from tests.data.plays import at_random
 
-    with patch.dict("experts.registry.EXPERTS.registered", {TASK: at_random}):
+    with patch.dict("robot_layouts.experts.registry.EXPERTS.registered", {TASK: at_random}):
         record(TASK, seeds, folder, workers=workers, **arguments)
 
 
 def process_executor(**arguments: Any) -> None:
     """Make one."""
-    from rollouts.playing.executor import ProcessExecutor
+    from robot_layouts.data.playing.executor import ProcessExecutor
 
     ProcessExecutor(**arguments)
 
 
 def ray_executor(**arguments: Any) -> None:
     """Make one."""
-    from rollouts.playing.ray_executor import RayExecutor
+    from robot_layouts.data.playing.ray_executor import RayExecutor
 
     RayExecutor(**arguments)
 
@@ -64,8 +64,8 @@ class Nobody:
 
     def run(self, prepare: Any, seeds: Any) -> Any:
         """Play, after a fashion."""
-        from rollouts.playing.executor import Event, WorkerError
-        from rollouts.playing.in_process import InProcessExecutor
+        from robot_layouts.data.playing.executor import Event, WorkerError
+        from robot_layouts.data.playing.in_process import InProcessExecutor
 
         if self.what == "forgets one":
             yield from InProcessExecutor().run(prepare, seeds[1:])
@@ -141,7 +141,7 @@ def _do(what: str, folder: Path) -> None:
         os.mkfifo(folder / "fifo")
         (folder / "fifo").read_bytes()
     elif kind == "half":
-        from tests.rollouts.plays import StopsHalfWay
+        from tests.data.plays import StopsHalfWay
 
         StopsHalfWay(folder).play(0)
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from experts.registry import EXPERTS
 from layouts.presets import PRESETS
+from robot_layouts.experts.registry import EXPERTS
 from tasks.registry import TASKS
 from tests.faults.fault import GOES_ON, Fault
 

@@ -104,8 +104,8 @@ def _hold(connection: Any, how: str, task_id: str) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     if how == "plays":
-        from rollouts.playing.executor import ProcessExecutor
-        from tests.rollouts.plays import Play
+        from robot_layouts.data.playing.executor import ProcessExecutor
+        from tests.data.plays import Play
 
         connection.send("begins")
         for event in ProcessExecutor(2).run(Play(lasts=0.05), range(10**6)):

@@ -22,7 +22,7 @@ AREA = "programs"
 SECONDS = 120.0
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2  # linux/prctl.h, capability.h
 HOMES = ("HOME", "TMPDIR", "XDG_CACHE_HOME")
-RECORD = ("rollouts", "record", "--task", "PushCube-v1", "--episodes", "1", "--workers", "1")
+RECORD = ("robot_layouts", "record", "--task", "PushCube-v1", "--episodes", "1", "--workers", "1")
 EXPORT = ("layouts", "export", "single", "arm=panda", "--no-visuals", "--format", "mjcf")
 
 
@@ -117,7 +117,7 @@ def _into_one_folder(folder: Path) -> None:
 
 
 def _evaluate(_: Path) -> None:
-    from rollouts import evaluate
+    from robot_layouts.data import evaluate
 
     calls = [lambda w=w: evaluate("expert", "PushCube-v1", (0,), workers=w) for w in (0, 1)]
     assert not _all(*calls)

@@ -17,7 +17,7 @@ from typing import Any
 from tests.faults.fault import GOES_ON, Fault, run_command
 
 AREA = "receipts"
-TASK, POLICY, SEEDS, STEPS = "PushT-v1", "tests.rollouts.policies:LEANS", (0, 1), 3
+TASK, POLICY, SEEDS, STEPS = "PushT-v1", "tests.data.policies:LEANS", (0, 1), 3
 HEX = "ab" * 32
 
 Place = tuple[str | int, ...]
@@ -60,7 +60,7 @@ def faults() -> Iterator[Fault]:
 @functools.cache
 def contents() -> str:
     """Return the text of a small receipt, as it was written."""
-    from rollouts import evaluate
+    from robot_layouts.data import evaluate
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "receipt.json"
@@ -70,7 +70,7 @@ def contents() -> str:
 
 def edited(folder: Path, edit: Callable[[Any], object]) -> Path:
     """Write the receipt, changed and with the hash of what it has become, to a folder."""
-    from rollouts.receipts import Receipt, ReceiptError
+    from robot_layouts.data.receipts import Receipt, ReceiptError
 
     path, about = folder / "receipt.json", json.loads(contents())
     edit(about)
@@ -83,7 +83,7 @@ def edited(folder: Path, edit: Callable[[Any], object]) -> Path:
 
 
 def _verify(folder: Path, edit: Callable[[Any], object]) -> Any:
-    from rollouts.receipts import verify
+    from robot_layouts.data.receipts import verify
 
     return verify(edited(folder, edit), workers=0, policy=POLICY)
 
@@ -96,7 +96,7 @@ def _differs(folder: Path, edit: Callable[[Any], object]) -> str:
 
 
 def _read(folder: Path, make: Callable[[Path], object]) -> None:
-    from rollouts.receipts import verify
+    from robot_layouts.data.receipts import verify
 
     make(folder / "receipt.json")
     verify(folder / "receipt.json", workers=0, policy=POLICY)
@@ -137,7 +137,7 @@ def _runs_nothing(
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     try:
-        run_command("rollouts", *words, cwd=folder, env=environment)
+        run_command("robot_layouts", *words, cwd=folder, env=environment)
     finally:
         assert sorted(folder.rglob("*")) == before, "something of it ran"
 
@@ -354,7 +354,7 @@ _GADGETS = (
     "antigravity:fly",
     "strange:policy",
     "strange.inside:policy",
-    "tests.rollouts.policies:dies",
+    "tests.data.policies:dies",
     "os:system; touch ran",
     "../strange:policy",
 )
@@ -384,7 +384,7 @@ _STRANGE_ROBOTS: dict[str, Callable[[Any], object]] = {
 
 
 def _verified(folder: Path, **arguments: Any) -> None:
-    from rollouts.receipts import verify
+    from robot_layouts.data.receipts import verify
 
     verify(edited(folder, lambda _: None), **{"workers": 0, **arguments})
 

@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 
 if TYPE_CHECKING:
-    from rollouts.reading.recording import Trajectory
-    from rollouts.recording.recorder import Recorder
+    from robot_layouts.data.reading.recording import Trajectory
+    from robot_layouts.data.recording.recorder import Recorder
     from tasks import TaskEnv
 
 AREA = "recordings"
@@ -57,7 +57,7 @@ def contents() -> tuple[bytes, bytes]:
 
 def recorder(path: Path, **how: bool) -> Recorder:
     """Begin a recording, or go on with it."""
-    from rollouts.recording.recorder import Recorder
+    from robot_layouts.data.recording.recorder import Recorder
 
     return Recorder(path, task(), **how)
 
@@ -90,7 +90,7 @@ def edit_json(path: Path, edit: Callable[[dict[str, Any]], None]) -> None:
 
 def read(path: Path) -> list[Trajectory]:
     """Read all that a replay or an export would."""
-    from rollouts.reading.recording import Recording
+    from robot_layouts.data.reading.recording import Recording
 
     with Recording(path) as file:
         file.expect(TASK, ACTIONS)

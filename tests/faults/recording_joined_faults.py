@@ -70,7 +70,7 @@ def _flip_and_use(folder: Path, where: str, use: Callable[[Path], Any]) -> None:
 
 
 def _replay(path: Path) -> None:
-    from rollouts.playing.replay import open_recording, replay, task_for
+    from robot_layouts.data.playing.replay import open_recording, replay, task_for
 
     with open_recording(path, None) as file:
         task = task_for(file)
@@ -87,7 +87,7 @@ def _export_robomimic(path: Path) -> None:
 
 
 def _export(path: Path, format_name: str) -> None:
-    from rollouts.export.dataset import Export, export
+    from robot_layouts.data.export.dataset import Export, export
 
     try:
         export(Export(path, format_name, path.parent / "out", include_failures=True))
@@ -96,8 +96,8 @@ def _export(path: Path, format_name: str) -> None:
 
 
 def _view(path: Path) -> None:
-    from rollouts.commands import episode_cell
-    from rollouts.playing.replay import open_recording
+    from robot_layouts.data.commands import episode_cell
+    from robot_layouts.data.playing.replay import open_recording
 
     with open_recording(path, None) as file:
         episode_cell(file, 1)

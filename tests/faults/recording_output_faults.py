@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
+from robot_layouts.core.commands import printable
 from robots import RobotLayoutsError
-from robots.common.commands import printable
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.recording_files import AREA, edited, recording
 
@@ -85,11 +85,11 @@ def _shell(line: str) -> subprocess.CompletedProcess[str]:
 def _record(folder: Path, redirection: str) -> str:
     """Record for longer than the two seconds after which progress is shown."""
     done = _shell(
-        f"{sys.executable} -m rollouts record --task PullCube-v1 --episodes 3 --out {folder}/r"
+        f"{sys.executable} -m robot_layouts record --task PullCube-v1 --episodes 3 --out {folder}/r"
         f" {redirection}"
     )
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
-    from rollouts.reading.recording import Recording
+    from robot_layouts.data.reading.recording import Recording
 
     with Recording(folder / "r" / "trajectory.h5") as file:
         assert [episode.seed for episode in file] == [0, 1, 2]
@@ -99,13 +99,13 @@ def _record(folder: Path, redirection: str) -> str:
 def _quiet(folder: Path, words: str, redirection: str) -> str:
     path = recording(folder)
     words = words.format(h5=path, out=folder / "out")
-    done = _shell(f"{sys.executable} -m rollouts {words} {redirection}")
+    done = _shell(f"{sys.executable} -m robot_layouts {words} {redirection}")
     assert (done.returncode, done.stderr) == (0, "")
     return "it ends with 0"
 
 
 def _full(folder: Path) -> None:
-    done = _shell(f"{sys.executable} -m rollouts replay {recording(folder)} > /dev/full")
+    done = _shell(f"{sys.executable} -m robot_layouts replay {recording(folder)} > /dev/full")
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1, done.stderr
     raise RobotLayoutsError(done.stderr.strip())
@@ -114,8 +114,8 @@ def _full(folder: Path) -> None:
 # An export that stops in the middle until it is killed, as one of a large recording would be.
 _SLOW = """
 import sys, time
-from rollouts.export.dataset import Export, export
-from robots.common.commands import start
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.core.commands import start
 def main():
     def wait(done, total):
         print("writing", flush=True)
@@ -140,7 +140,7 @@ def _slow_export(path: Path, out: Path) -> subprocess.Popen[str]:
 
 
 def _export(path: Path, out: Path) -> None:
-    from rollouts.export.dataset import Export, export
+    from robot_layouts.data.export.dataset import Export, export
 
     assert export(Export(path, "robomimic", out, include_failures=True)).episodes == 3
 
@@ -214,7 +214,7 @@ _TAKEN: dict[str, Callable[[Path], None]] = {
 
 
 def _named(folder: Path, name: str) -> str:
-    from rollouts.__main__ import main
+    from robot_layouts.__main__ import main
 
     place = folder / name
     place.mkdir(parents=True)
@@ -228,7 +228,7 @@ def _named(folder: Path, name: str) -> str:
 
 def _steering(folder: Path) -> None:
     """Refuse a file with such a name as the command does, which prints it."""
-    from rollouts.__main__ import main
+    from robot_layouts.__main__ import main
 
     path = recording(folder)
     with edited(path) as file:

@@ -235,7 +235,7 @@ def _renamed(folder: Path) -> str:
 
 def _other_task(folder: Path) -> None:
     import tasks
-    from rollouts.recording.recorder import Recorder
+    from robot_layouts.data.recording.recorder import Recorder
 
     path = _stopped(folder)
     Recorder(path, tasks.make("PullCube-v1"), resume=True)

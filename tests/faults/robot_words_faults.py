@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from layouts import Layout, Placement, single
-from motion import Motion
+from robot_layouts.data.suite.files import read_layout
+from robot_layouts.motion import Motion
 from robots import RobotDescriptor
 from robots.named import named_robot
-from rollouts.suite.files import read_layout
 from tests.experts.free_motions import swing
 from tests.faults.fault import GOES_ON, Fault
 from tests.robots.urdf_parts import Parts

@@ -17,7 +17,7 @@ import pytest
 from tests.faults.fault import GOES_ON, Fault, run_command
 
 AREA = "suites"
-TASK, POLICY = "PushT-v1", "tests.rollouts.policies:LEANS"
+TASK, POLICY = "PushT-v1", "tests.data.policies:LEANS"
 HEAD = "name: x\nseeds: 0\ntasks:\n"
 SUITE = f"{HEAD}  - {{task: {TASK}, name: First}}\n  - {{task: {TASK}, name: Later, seeds: 1-2}}\n"
 LONG = (
@@ -56,7 +56,7 @@ def faults() -> Iterator[Fault]:
 
 
 def _load(folder: Path, text: str) -> None:
-    from rollouts.suite.files import load_suite
+    from robot_layouts.data.suite.files import load_suite
 
     (folder / "suite.yaml").write_text(text)
     load_suite(folder / "suite.yaml")
@@ -171,8 +171,8 @@ _ELSEWHERE = {
 
 def _reads_nothing(folder: Path, key: str, value: str) -> None:
     """Read a suite in a folder below that of a secret; no message tells the secret."""
+    from robot_layouts.data.suite.files import load_suite
     from robots import RobotLayoutsError
-    from rollouts.suite.files import load_suite
 
     (folder / "secret.yaml").write_text(SECRET)
     own = folder / "theirs"
@@ -211,7 +211,7 @@ def _runs_nothing(folder: Path, words: tuple[str, ...], text: str) -> None:
     environment = {"BROWSER": str(folder / "browser"), "PYTHONDONTWRITEBYTECODE": "1"}
     before = sorted(folder.iterdir())
     try:
-        run_command("rollouts", "suite", *words, cwd=folder, env={**os.environ, **environment})
+        run_command("robot_layouts", "suite", *words, cwd=folder, env={**os.environ, **environment})
     finally:
         assert sorted(folder.iterdir()) == before, "something of it ran"
 
@@ -220,7 +220,7 @@ def _runs_nothing(folder: Path, words: tuple[str, ...], text: str) -> None:
 
 
 def _suite(folder: Path, text: str = SUITE) -> Any:
-    from rollouts.suite.files import load_suite
+    from robot_layouts.data.suite.files import load_suite
 
     (folder / "mine.yaml").write_text(text)
     return load_suite(folder / "mine.yaml")
@@ -228,7 +228,7 @@ def _suite(folder: Path, text: str = SUITE) -> Any:
 
 def _play(folder: Path, policy: Any = POLICY, text: str = SUITE, **how: Any) -> Mapping[str, Any]:
     """Play a suite into the folder's ``run``, and return the hashes of its receipts."""
-    from rollouts.suite.run import run_suite
+    from robot_layouts.data.suite.run import run_suite
 
     run = run_suite(_suite(folder, text), folder / "run", policy, **{"workers": 0, **how})
     return {name: receipt.hash for name, receipt in run.receipts.items()}
@@ -298,14 +298,14 @@ def _another(folder: Path) -> None:
     _play(folder, only=["First"])
     before = _receipt(folder).read_bytes()
     try:
-        _play(folder, "tests.rollouts.policies:still")
+        _play(folder, "tests.data.policies:still")
     finally:
         assert _receipt(folder).read_bytes() == before
         assert not _receipt(folder, "Later").exists()
 
 
 def _verify(folder: Path, **how: Any) -> None:
-    from rollouts.suite.run import verify_run
+    from robot_layouts.data.suite.run import verify_run
 
     _play(folder)
     verify_run(folder / "run", workers=0, **how)
@@ -326,7 +326,7 @@ _RUNS: dict[str, Callable[[Path], None]] = {
     "another policy into its folder": _another,
     "a policy that is not there": lambda folder: _play(folder, "no.such:policy") and None,
     "a policy that is none": lambda folder: _play(folder, 5) and None,
-    "a policy that raises": lambda f: _play(f, "tests.rollouts.policies:fails") and None,
+    "a policy that raises": lambda f: _play(f, "tests.data.policies:fails") and None,
     "a policy of no task of it": lambda f: _play(f, {"PickCube-v1": POLICY}) and None,
     "cases that it has not": lambda folder: _play(folder, only=["Frist"]) and None,
     "fewer than no workers": lambda folder: _play(folder, workers=-1) and None,
@@ -340,7 +340,7 @@ _RUNS: dict[str, Callable[[Path], None]] = {
     "verify: nobody is named to play": _verify,
     "verify: a policy that is not there": lambda folder: _verify(folder, policy="no.such:policy"),
     "verify: a folder of nothing": lambda f: (
-        run_command("rollouts", "suite", "verify", str(f)) and None
+        run_command("robot_layouts", "suite", "verify", str(f)) and None
     ),
 }
 
@@ -350,7 +350,7 @@ def _begun(folder: Path, text: str) -> subprocess.Popen[bytes]:
     (folder / "mine.yaml").write_text(text)
     words = ["suite", "run", folder / "mine.yaml", "--out", folder / "run", "--policy", POLICY]
     process = subprocess.Popen(
-        [sys.executable, "-m", "rollouts", *words, "--workers=1"],
+        [sys.executable, "-m", "robot_layouts", *words, "--workers=1"],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
@@ -381,7 +381,7 @@ def _twice(folder: Path) -> None:
     process = _begun(folder, LONG)
     before = _receipt(folder).read_bytes()
     try:
-        _play(folder, "tests.rollouts.policies:still", LONG, only=["Later"])
+        _play(folder, "tests.data.policies:still", LONG, only=["Later"])
     finally:
         process.terminate()
         process.wait(60)

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 import tasks
+from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.recording.recorder import Recorder
+from robot_layouts.data.teleop.session import Session
 from robots import RecordingError, TaskError
-from rollouts.reading.recording import Recording
-from rollouts.recording.record import FILE
-from rollouts.recording.recorder import Recorder
-from rollouts.teleop.session import Session
 from tests.faults.fault import GOES_ON, Fault
 
 AREA = "teleoperation"

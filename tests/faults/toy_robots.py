@@ -73,7 +73,7 @@ def check(urdf: Path) -> None:
 
 def build(urdf: Path) -> None:
     """Build a world and see that every link has the shape that its URDF gives it."""
-    from simulation.sapien3.world import BuiltWorld
+    from robot_layouts.simulation.sapien3.world import BuiltWorld
 
     world = BuiltWorld(Layout({"toy": Placement(descriptor(urdf))}))
     for link_name, made in world.robots["toy"].links.items():
@@ -102,8 +102,8 @@ def read_by_all(urdf: Path, readers: tuple[str, ...] = ("guess", "check", "build
 
 def read_repaired(urdf: Path) -> str:
     """Have a URDF guessed, checked and built that needs a repair; return what was repaired."""
+    from robot_layouts.simulation.sapien3.world import BuiltWorld
     from robots.urdf.summary import read_cleaned
-    from simulation.sapien3.world import BuiltWorld
 
     guess(urdf)
     check(urdf)

@@ -4,13 +4,13 @@ import functools
 
 import numpy as np
 
-from kinematics.tree import Tree
 from layouts import Layout, Placement
+from robot_layouts.kinematics.tree import Tree
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotRegistry
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned
 from robots.urdf.tree import kinematic_tree
-from simulation.sapien3.world import BuiltWorld
 
 
 @functools.cache

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kinematics import quaternions, rotations
+from robot_layouts.kinematics import quaternions, rotations
 
 angles = st.floats(-math.pi, math.pi)
 COUNT = 200

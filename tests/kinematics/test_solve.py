@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kinematics.rotations import rotation_about, rotation_vector
-from kinematics.solve import (
+from robot_layouts.kinematics.rotations import rotation_about, rotation_vector
+from robot_layouts.kinematics.solve import (
     NEAR_ENOUGH,
     Goal,
     approach,

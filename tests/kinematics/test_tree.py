@@ -10,8 +10,8 @@ import yourdfpy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinematics.rotations import rotation_vector
-from kinematics.tree import FIXED, Tree
+from robot_layouts.kinematics.rotations import rotation_vector
+from robot_layouts.kinematics.tree import FIXED, Tree
 from robots import DescriptorError, RobotRegistry, UnknownNameError
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned

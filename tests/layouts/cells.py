@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import numpy as np
 import yourdfpy
 
-from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement, ceiling, wall
+from robot_layouts.kinematics.rotations import pose_matrix
 
 
 def mixed_cell() -> Layout:

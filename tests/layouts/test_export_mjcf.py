@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement, ceiling, single, table
 from layouts.export.cell import ExportedCell
 from layouts.export.mjcf import TIMESTEPS
+from robot_layouts.kinematics.rotations import pose_matrix
 from robots import AssetError, CameraMount, LayoutError, RobotDescriptor
 from robots.bodies.hulls import load_model
 from tests.layouts.travelling import OUTSIDE, link_poses, outside

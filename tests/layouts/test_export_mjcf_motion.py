@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from kinematics.rotations import quaternion_of
 from layouts import single
-from simulation import PhysicsSettings, build_scene
+from robot_layouts.kinematics.rotations import quaternion_of
+from robot_layouts.simulation import PhysicsSettings, build_scene
 
 HALF, DENSITY = 0.02, 1000.0  # of the cube: half a side (m), and kg/m³, as ManiSkill's
 CLOSING, LIFTING = 0.8, 1.5  # s

@@ -11,9 +11,9 @@ import yourdfpy
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from kinematics.quaternions import normalised, quaternion_rpy, rpy_quaternion
-from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement, face_to_face, single
+from robot_layouts.kinematics.quaternions import normalised, quaternion_rpy, rpy_quaternion
+from robot_layouts.kinematics.rotations import pose_matrix
 from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
 from robots.urdf.summary import read_references
 from tests.catalogue import every_robot

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinematics.quaternions import forward, inverted, multiplied, rotated, upward
 from layouts import (
     Frame,
     Layout,
@@ -23,6 +22,7 @@ from layouts import (
     yaw_quaternion,
 )
 from layouts.frames import EDGES, table_outlines
+from robot_layouts.kinematics.quaternions import forward, inverted, multiplied, rotated, upward
 from robots import LayoutError
 
 numbers = st.floats(-10, 10)

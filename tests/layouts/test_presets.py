@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinematics.quaternions import forward, multiplied, rotated, upward, yaw_degrees
 from layouts import (
     Layout,
     around_table,
@@ -22,6 +21,7 @@ from layouts import (
 from layouts.distances import HAND_OVER, ROUND_CORNERS
 from layouts.frames import EDGES, table_outlines
 from layouts.presets import PRESETS
+from robot_layouts.kinematics.quaternions import forward, multiplied, rotated, upward, yaw_degrees
 from robots import LayoutError, RobotRegistry, UnknownNameError
 
 spacings = st.floats(min_value=1e-3, max_value=100.0)

@@ -244,7 +244,7 @@ def test_a_robot_that_touches_itself_is_refused(tmp_path):
 
 
 def test_a_long_search_tells_how_far_it_is(monkeypatch, capsys):
-    monkeypatch.setattr("robots.common.progress.PATIENCE", 0.0)
+    monkeypatch.setattr("robot_layouts.core.progress.PATIENCE", 0.0)
     search({"arm": "so100"}, {"cube": (0.0, 0.0, 0.1)}, **QUICK)
     said = capsys.readouterr().err
     assert "looking for places: who can reach cube\n" in said

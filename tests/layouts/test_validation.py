@@ -520,7 +520,7 @@ class TestDraws:
             side_by_side(PANDAS, spacing=0.3).validate(samples=samples)
 
     def test_a_long_check_tells_how_far_it_is(self, monkeypatch, capsys):
-        monkeypatch.setattr("robots.common.progress.PATIENCE", 0.0)
+        monkeypatch.setattr("robot_layouts.core.progress.PATIENCE", 0.0)
         side_by_side(PANDAS, spacing=0.3).validate()
         assert "checking the layout: left with right\n" in capsys.readouterr().err
 

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinematics.rotations import rotate
 from layouts import Layout, Placement
 from layouts.validation.reach import Reach
+from robot_layouts.kinematics.rotations import rotate
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotRegistry, UnknownNameError
 from robots.bodies.hulls import load_model
-from simulation.sapien3.world import BuiltWorld
 from tests.catalogue import every_robot
 from tests.layouts.small_robots import turntable
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement, around_table, ceiling, wall
 from layouts.export.cell import ExportedCell, Standing
+from robot_layouts.kinematics.rotations import pose_matrix
 from robots import RobotDescriptor, RobotRegistry
 from robots.registry import CATALOGUE
 from robots.urdf.tree import kinematic_tree

@@ -5,12 +5,12 @@ from __future__ import annotations
 import fcl
 import numpy as np
 
-from kinematics.rotations import Floats, pose_matrix
 from layouts import Layout, Placement, ring
-from motion.collision.cell import Cell
-from motion.collision.checker import Checker
-from motion.model.bodies import Bodies
-from motion.model.obstacles import Track, box, cylinder, sphere
+from robot_layouts.kinematics.rotations import Floats, pose_matrix
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.collision.checker import Checker
+from robot_layouts.motion.model.bodies import Bodies
+from robot_layouts.motion.model.obstacles import Track, box, cylinder, sphere
 from robots import RobotDescriptor
 from tests import three_links
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from layouts import face_to_face
-from motion import Motion
-from motion.model.obstacles import Held, Track, box, sphere
+from robot_layouts.motion import Motion
+from robot_layouts.motion.model.obstacles import Held, Track, box, sphere
 from tests.experts.free_motions import swing
 
 LAYOUT = face_to_face({"left": "panda", "right": "so100"}, spacing=0.9)

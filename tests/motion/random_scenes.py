@@ -9,11 +9,11 @@ from tempfile import mkdtemp
 
 import numpy as np
 
-from kinematics.rotations import pose_matrix
 from layouts import Layout, Placement
-from motion import Motion
-from motion.collision.cell import Cell
-from motion.model.obstacles import Held, Obstacle, Track, box
+from robot_layouts.kinematics.rotations import pose_matrix
+from robot_layouts.motion import Motion
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.model.obstacles import Held, Obstacle, Track, box
 from robots import RobotDescriptor
 from tests import three_links
 from tests.layouts.small_robots import joint, link, robot, urdf

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
-from motion import NoPlanError, plan
-from motion.collision.cell import Cell
-from motion.collision.clearances import Clearances
-from motion.model.obstacles import Track, box
-from motion.planning.goals import Target
-from motion.planning.infeasibility import InfeasibilityProofs
-from motion.planning.query import Query
-from motion.timing.trajectories import CellTrajectory
-from robots.common.progress import Progress
+from robot_layouts.core.progress import Progress
+from robot_layouts.motion import NoPlanError, plan
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.collision.clearances import Clearances
+from robot_layouts.motion.model.obstacles import Track, box
+from robot_layouts.motion.planning.goals import Target
+from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs
+from robot_layouts.motion.planning.query import Query
+from robot_layouts.motion.timing.trajectories import CellTrajectory
 
 PAN, LIFT = range(2)
 TABLE = (-2.0, -2.0, 2.0, 2.0)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from motion import Motion, plan
-from motion.collision.cell import Cell
-from motion.model.obstacles import box
+from robot_layouts.motion import Motion, plan
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.model.obstacles import box
 from tests.motion.two_pandas import aside, cell, in_the_middle, turned
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
-from motion.collision.cell import Cell
-from motion.model.link_poses import LinkPoses
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.model.link_poses import LinkPoses
 from tests.catalogue import every_robot
 from tests.layouts.cells import mixed_cell
 from tests.motion import cells

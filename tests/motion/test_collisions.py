@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 
 from layouts import Layout, Placement, face_to_face
 from layouts.validation.collisions import FAR
-from motion.collision.cell import Cell
-from motion.collision.checker import Checker
-from motion.collision.travel import TravelBounds
-from motion.model.bodies import WORLD
-from motion.model.obstacles import Track, box
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.collision.checker import Checker
+from robot_layouts.motion.collision.travel import TravelBounds
+from robot_layouts.motion.model.bodies import WORLD
+from robot_layouts.motion.model.obstacles import Track, box
 from robots import LayoutError, UnknownNameError
 from tests.layouts.small_robots import joint, link, robot, urdf
 from tests.motion import cells

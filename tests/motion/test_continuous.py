@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinematics.rotations import rotation_about
 from layouts import single
-from motion import Motion, MotionError
-from motion.collision.cell import Cell
-from motion.model.obstacles import Obstacle, Track, box
+from robot_layouts.kinematics.rotations import rotation_about
+from robot_layouts.motion import Motion, MotionError
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.model.obstacles import Obstacle, Track, box
 from robots import LayoutError
 from tests import three_links
 from tests.layouts.small_robots import robot

@@ -5,8 +5,8 @@ import pickle
 import numpy as np
 import pytest
 
-from motion import Motion, MotionError
-from motion.model.hermite import hermite, hermite_bends, hermite_slopes
+from robot_layouts.motion import Motion, MotionError
+from robot_layouts.motion.model.hermite import hermite, hermite_bends, hermite_slopes
 from robots import UnknownNameError
 from tests.motion.two_pandas import cell
 

@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from layouts import face_to_face
-from motion import Motion, MotionError
+from robot_layouts.core.errors import UnwritableFileError
+from robot_layouts.motion import Motion, MotionError
 from robots import LayoutError
-from robots.common.errors import UnwritableFileError
 from tests.experts.free_motions import swing
 from tests.motion.motions import LAYOUT, busy_motion
 

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.teleop import served
 from layouts import face_to_face
-from motion.output.page import motion_cell
+from robot_layouts.motion.output.page import motion_cell
 from tests.experts.free_motions import swing
 from tests.motion.motions import LAYOUT, busy_motion
 from tests.pages import browser_page, changed, coloured, settled
@@ -41,7 +41,7 @@ def test_a_page_shows_what_moves_and_what_stands():
 def test_a_motion_is_scrubbed_and_played(tmp_path):
     file = swing(SMALL, seconds=1.0, far=0.8).save(tmp_path / "motion.json")
     with (
-        served("motion", "show", str(file), "--port", "0") as view,
+        served("robot_layouts", "motion", "show", str(file), "--port", "0") as view,
         browser_page() as (page, asked),
     ):
         page.goto(view.url)

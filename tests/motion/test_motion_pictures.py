@@ -8,9 +8,9 @@ from PIL import Image
 
 from layouts import face_to_face
 from layouts.preview import COLOURS
-from motion import MotionError
-from motion.output.pictures import MOST_MARKS, _marks, save_picture
-from motion.output.scenes import Scenes
+from robot_layouts.motion import MotionError
+from robot_layouts.motion.output.pictures import MOST_MARKS, _marks, save_picture
+from robot_layouts.motion.output.scenes import Scenes
 from tests.experts.free_motions import swing
 
 LAYOUT = face_to_face({"left": "so100", "right": "so100"}, spacing=0.6)

@@ -6,8 +6,8 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinematics.rotations import pose_matrix, quaternion_about, rotation_vector
-from motion.model.obstacles import Held, Obstacle, Track, box, cylinder, mesh, sphere
+from robot_layouts.kinematics.rotations import pose_matrix, quaternion_about, rotation_vector
+from robot_layouts.motion.model.obstacles import Held, Obstacle, Track, box, cylinder, mesh, sphere
 from robots import LayoutError
 
 FLAT = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (1.0, 1.0, 0.0)])

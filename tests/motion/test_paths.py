@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from layouts import Layout, single
-from motion import MotionError
-from motion.timing.paths import Path, way, without_straight_points
-from motion.timing.velocities import largest_accelerations, largest_velocities, timed
+from robot_layouts.motion import MotionError
+from robot_layouts.motion.timing.paths import Path, way, without_straight_points
+from robot_layouts.motion.timing.velocities import largest_accelerations, largest_velocities, timed
 from tests.motion.two_pandas import cell
 
 SPEEDS = np.array([1.0, 2.0, 0.5])

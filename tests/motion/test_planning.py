@@ -8,9 +8,9 @@ import pytest
 
 from layouts import Placement, single
 from layouts.layout import Layout
-from motion import MotionError, NoPlanError, RegionGoal, TcpGoal, plan
-from motion.collision.cell import Cell
-from motion.model.obstacles import Track, box
+from robot_layouts.motion import MotionError, NoPlanError, RegionGoal, TcpGoal, plan
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.model.obstacles import Track, box
 from robots import UnknownNameError
 from robots.urdf.tcp import find_tcp
 from tests.fresh_process import in_fresh_process
@@ -267,7 +267,7 @@ def test_motion_is_light_to_import():
 def loaded_by_motion() -> list[str]:
     import sys
 
-    import motion  # noqa: F401
+    from robot_layouts import motion  # noqa: F401
 
     return [name for name in ("ompl", "toppra", "fcl", "sapien", "torch") if name in sys.modules]
 

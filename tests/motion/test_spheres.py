@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from motion.collision.spheres import BALLS, clusters_of
+from robot_layouts.motion.collision.spheres import BALLS, clusters_of
 from robots import RobotRegistry
 from robots.bodies.hulls import Hull, load_model
 from tests.catalogue import every_robot

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from layouts import Layout, face_to_face
-from motion import TcpGoal
+from robot_layouts.motion import TcpGoal
 
 DOWN = (0.0, 1.0, 0.0, 0.0)  # wxyz; a gripper that points down
 

@@ -10,19 +10,19 @@ import torch
 import tasks
 from layouts import Layout, Placement, ring
 from robot_layouts.__main__ import main
+from robot_layouts.data import evaluate
+from robot_layouts.data.playing.replay import open_recording, replay, task_for
+from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.recording.record import record
+from robot_layouts.data.recording.recorder import Recorder
 from robots import ActionError, RobotRegistry, TaskError
-from rollouts import evaluate
-from rollouts.playing.replay import open_recording, replay, task_for
-from rollouts.reading.recording import Recording, TrajectoryError
-from rollouts.recording.record import record
-from rollouts.recording.recorder import Recorder
 from tasks import Needs
 from tasks.__main__ import main as tasks_main
 from tasks.cell_options import chosen_robots
 from tasks.engine.bystanders import check_needs
 from tasks.episode import play
 from tasks.language.needs import gripper_opening
-from tests.rollouts.recordings import edited
+from tests.data.recordings import edited
 from tests.three_links import arm, save
 
 RELAY, PICK = "Relay-v1", "PickCube-v1"

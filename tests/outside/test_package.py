@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from rollouts.reading.recording import Recording
+from robot_layouts.data.reading.recording import Recording
+from tests.data.clusters import running_cluster
 from tests.outside.lab import CHECKOUT, PACKAGE, TRAY, add_metadata, make_folder, row, run, words
-from tests.rollouts.clusters import running_cluster
 
 RECORD = f"record {words(task=TRAY, out='data', episodes=2)}"
 

@@ -14,8 +14,8 @@ from parity.episodes import (
     random_episodes,
     recorded_source,
 )
+from robot_layouts.data.reading.recording import TrajectoryError
 from robots import TaskError
-from rollouts.reading.recording import TrajectoryError
 
 TASK = "PickCube-v1"
 

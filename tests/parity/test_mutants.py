@@ -9,9 +9,9 @@ import tasks
 from layouts import Layout
 from parity.episodes import random_episodes
 from parity.lockstep import EpisodeResult, NativeSide, OurSide, compare
+from robot_layouts.simulation import State
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotDescriptor, RobotRegistry
-from simulation import State
-from simulation.sapien3.world import BuiltWorld
 from tasks.episode import Episode
 from tests.motions import touching_episode
 from tests.native import NATIVE, against_native, complaints, pair

@@ -9,10 +9,10 @@ import pytest
 import sapien
 
 from layouts import Layout, Placement
+from robot_layouts.simulation import PhysicsSettings, Simulation
+from robot_layouts.simulation.checks.floor import adds_floor
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import CONTROL_MODES, RobotDescriptor, RobotRegistry
-from simulation import PhysicsSettings, Simulation
-from simulation.checks.floor import adds_floor
-from simulation.sapien3.backend import worlds_below
 from tests.native import NATIVE
 
 pytestmark = NATIVE

@@ -7,7 +7,7 @@ import pytest
 
 import tasks
 from parity.episodes import random_episodes
-from simulation import PhysicsSettings, World
+from robot_layouts.simulation import PhysicsSettings, World
 from tests.native import NATIVE, TASKS, against_native
 from tests.quick import quick_cases
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from robot_layouts.core.paths import default_root
 from robots.assets import sources as asset_sources
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import SourceError, find_package
 from robots.assets.store import AssetStore
-from robots.common.paths import default_root
 from tests.robots.hub_server import HubServer
 
 REAL_ROOT = default_root()

@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 import torch
 
+from robot_layouts.core.bounds import (
+    checked_flag,
+    checked_number,
+    checked_numbers,
+    checked_whole,
+    shown,
+)
 from robots import TaskError
-from robots.common.bounds import checked_flag, checked_number, checked_numbers, checked_whole, shown
 
 
 @pytest.mark.parametrize(

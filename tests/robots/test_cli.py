@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 import pytest
 
 from robot_layouts.__main__ import PROGRAM
+from robot_layouts.core.cli import Command, Count, Program, Word
+from robot_layouts.core.commands import UsageError
 from robots import UnknownNameError
-from robots.common.cli import Command, Count, Program, Word
-from robots.common.commands import UsageError
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from robot_layouts.core.commands import exit_code, is_watched, notice, printable
 from robots import AssetError, RobotLayoutsError, UnknownNameError
-from robots.common.commands import exit_code, is_watched, notice, printable
 
 REPOSITORY = Path(__file__).parents[2]
-BEGIN = "import os, sys; from robots.common.commands import exit_code, notice, start; "
+BEGIN = "import os, sys; from robot_layouts.core.commands import exit_code, notice, start; "
 ROOMS = {
     "robots": "robots.inspect panda --help",
     "layouts": "layouts --help",

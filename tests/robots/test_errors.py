@@ -4,8 +4,8 @@ import pickle
 
 import pytest
 
+from robot_layouts.core.quoting import MOST_CHARACTERS
 from robots import LayoutError, RobotRegistry, UnknownNameError
-from robots.common.quoting import MOST_CHARACTERS
 
 
 def test_a_long_name_is_quoted_by_its_beginning_and_its_end():

@@ -7,8 +7,7 @@ import socket
 
 import pytest
 
-from robots import UnreadableFileError
-from robots.common.files import (
+from robot_layouts.core.files import (
     MAX_JSON_DEPTH,
     open_regular,
     parse_json,
@@ -16,6 +15,7 @@ from robots.common.files import (
     read_regular,
     read_text,
 )
+from robots import UnreadableFileError
 
 
 def test_a_regular_file_is_read_whole_up_to_its_limit(tmp_path):

@@ -8,17 +8,17 @@ import sys
 import numpy as np
 import pytest
 
-from kinematics.rotations import pose_matrix
 from layouts import face_to_face, single
+from robot_layouts.core.errors import UnwritableFileError
+from robot_layouts.kinematics.rotations import pose_matrix
+from robot_layouts.simulation import Simulation
 from robots import CameraMount, DescriptorError, RobotRegistry, UnknownNameError
 from robots.assets.assembled import AssembledUrdf, Part
 from robots.assets.locator import LocalUrdf
-from robots.common.errors import UnwritableFileError
 from robots.grafting import Mount, on_body, with_camera, with_gripper, with_tool
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
-from simulation import Simulation
 
 LINK = """<link name="{name}"><inertial><mass value="0.2"/><inertia ixx="1e-3" iyy="1e-3"
  izz="1e-3" ixy="0" ixz="0" iyz="0"/></inertial><collision><origin xyz="0 0 {z}"/><geometry>

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from robot_layouts import __main__ as console
+from robot_layouts.core.paths import default_root
 from robots import RobotRegistry
 from robots.assets.store import AssetStore
-from robots.common.paths import default_root
 from robots.inspect import find_urdf, main, report
 from tests.catalogue import every_robot
 

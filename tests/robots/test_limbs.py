@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinematics.rotations import transform
+from robot_layouts.kinematics.rotations import transform
 from robots import ActionSplit, DescriptorError, JointGroup, Limb, RobotDescriptor, RobotRegistry
 from robots.guessing.anatomy import find_anatomy
 from robots.guessing.tool import Tool, find_base, find_reach

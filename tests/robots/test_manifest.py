@@ -9,11 +9,11 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
+from robot_layouts.core.paths import CHECKOUT_CACHE
 from robots import AssetError, UnknownNameError, write_manifest
 from robots.assets import manifest
 from robots.assets.manifest import LARGEST_FILE, Manifest, load_manifest
 from robots.assets.packages import find_package
-from robots.common.paths import CHECKOUT_CACHE
 from robots.write_manifest import build_package
 
 

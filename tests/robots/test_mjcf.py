@@ -11,6 +11,8 @@ import trimesh
 
 from benchmarks.robots.probe import kinematic_difference
 from layouts import single
+from robot_layouts.data.reading.guessed_robots import describe_guessed, guess_again
+from robot_layouts.data.reading.summary import TrajectoryError
 from robots import (
     AssetError,
     DescriptorError,
@@ -23,8 +25,6 @@ from robots.mjcf import conversion
 from robots.named import named_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
-from rollouts.reading.guessed_robots import describe_guessed, guess_again
-from rollouts.reading.summary import TrajectoryError
 
 from .mjcf_parts import JAWS, arm, mjcf, motors, write
 

@@ -8,9 +8,9 @@ import sys
 
 import pytest
 
+from robot_layouts.core import portable
+from robot_layouts.core.portable import is_portable, missing_variables, portable_variables
 from robots import SimulationError
-from robots.common import portable
-from robots.common.portable import is_portable, missing_variables, portable_variables
 from robots.portable import main, numpy_versions
 
 BEGIN = (sys.executable, "-m", "robots.portable")
@@ -76,7 +76,7 @@ def test_a_variable_that_is_missing_is_named(name):
     del variables[name]
     assert missing_variables(variables) == [name]
     complaint = python(SAYS, **variables)
-    assert complaint.startswith("robots.common.errors.SimulationError: ROBOT_LAYOUTS_PORTABLE")
+    assert complaint.startswith("robot_layouts.core.errors.SimulationError: ROBOT_LAYOUTS_PORTABLE")
     assert f": {name}; begin with `robot-layouts portable python" in complaint
 
 

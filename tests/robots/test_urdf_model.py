@@ -240,7 +240,7 @@ def watch(event, arguments):
     elif event == "open" and str(arguments[0]) in ("/etc/passwd", "no.stl"):
         seen.append(str(arguments[0]))
 from robots import LocalUrdf, RobotDescriptor
-from robots.common.errors import RobotLayoutsError
+from robot_layouts.core.errors import RobotLayoutsError
 import robots.from_urdf
 sys.addaudithook(watch)
 for path in sys.argv[1:]:

@@ -4,9 +4,9 @@ import os
 
 import pytest
 
+from robot_layouts.core.errors import UnwritableFileError
+from robot_layouts.core.writing import write_whole, writing_errors, written_whole
 from robots import RecordingError, TaskError
-from robots.common.errors import UnwritableFileError
-from robots.common.writing import write_whole, writing_errors, written_whole
 
 
 def names(folder) -> list[str]:

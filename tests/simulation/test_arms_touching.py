@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement, face_to_face, single
+from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.checks.overlaps import empty, stand
 from robots import RobotRegistry, SimulationError
-from simulation import Simulation
-from simulation.checks.overlaps import empty, stand
 
 DUAL = RobotRegistry.load("mobile_panda_dual")
 CELL = single({"cell": "mobile_panda_dual"})

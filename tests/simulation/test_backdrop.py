@@ -7,11 +7,11 @@ import pytest
 
 import tasks
 from layouts import single
-from simulation import Box, Camera, Simulation, World
-from simulation.rendering.pictures import vulkan_problem
-from simulation.sapien3.backend import worlds_below
-from simulation.sapien3.pictures.studio import Studio
-from simulation.scene.cameras import TEXTURES
+from robot_layouts.simulation import Box, Camera, Simulation, World
+from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.sapien3.pictures.studio import Studio
+from robot_layouts.simulation.scene.cameras import TEXTURES
 from tests.quick import quick_cases
 
 CAMERAS = {

@@ -7,10 +7,10 @@ import sapien
 import trimesh
 
 from layouts import Layout, Placement
+from robot_layouts.simulation.sapien3.blueprint import read_blueprint
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import AssetError
 from robots.urdf.checks import MAX_LINKS
-from simulation.sapien3.blueprint import read_blueprint
-from simulation.sapien3.world import BuiltWorld
 from tests.faults.toy_robots import descriptor, joint, link, mesh, robot, toy, write_mesh
 
 

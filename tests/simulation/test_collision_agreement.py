@@ -12,6 +12,7 @@ import pytest
 
 from layouts import Layout, Placement
 from layouts.validation.collisions import nearest, stand
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotDescriptor, RobotRegistry
 from robots.assets.packages import find_package
 from robots.bodies.allowed import allowed_pairs, rigid_pairs
@@ -19,7 +20,6 @@ from robots.bodies.hulls import load_model
 from robots.urdf.reading import read_model
 from robots.urdf.srdf import read_excluded_pairs
 from robots.urdf.summary import read_urdf
-from simulation.sapien3.world import BuiltWorld
 from tests.catalogue import QUICK, every_robot
 
 POSTURES = 200

@@ -10,10 +10,7 @@ import pytest
 import sapien
 
 from layouts import Layout, Placement
-from robots import AssetError, RobotDescriptor
-from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
-from simulation.sapien3.collision_groups import (
+from robot_layouts.simulation.sapien3.collision_groups import (
     BITS,
     FLOOR,
     NO_FLOOR_CONTACT,
@@ -21,7 +18,10 @@ from simulation.sapien3.collision_groups import (
     cover,
     overlap_words,
 )
-from simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robots import AssetError, RobotDescriptor
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
 from tests.faults.toy_robots import descriptor, joint, link, robot, toy
 
 POST = '<box size="0.06 0.06 0.2"/>'

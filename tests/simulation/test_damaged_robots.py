@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from layouts import single
+from robot_layouts.simulation import PhysicsSettings, Simulation
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import RobotDescriptor
-from simulation import PhysicsSettings, Simulation
-from simulation.sapien3.backend import worlds_below
 from tests.robots.damaged_robots import FINE, REPAIRS, with_tip, write_damaged
 
 TEXTS = {**{kind: text for kind, (text, _) in REPAIRS.items()}, **FINE}

@@ -9,14 +9,14 @@ import pytest
 import sapien
 
 from layouts import single
+from robot_layouts.simulation import PhysicsSettings, Simulation
+from robot_layouts.simulation.control.joint_positions import JointPositionController
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import RobotRegistry
 from robots.assets.packages import find_package
 from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
 from robots.urdf.summary import parse_urdf
-from simulation import PhysicsSettings, Simulation
-from simulation.control.joint_positions import JointPositionController
-from simulation.sapien3.backend import worlds_below
 from tests.catalogue import every_robot
 
 STEPS = 5

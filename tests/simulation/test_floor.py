@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from layouts import single
+from robot_layouts.core.errors import UnknownNameError
+from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.checks.floor import adds_floor, drives_on_floor
+from robot_layouts.simulation.checks.overlaps import stand
+from robot_layouts.simulation.checks.trial import try_robot
 from robots import ActionSplit, JointGroup, LocalUrdf, RobotDescriptor, RobotRegistry
-from robots.common.errors import UnknownNameError
 from robots.from_urdf import guess_descriptor
-from simulation import Simulation
-from simulation.checks.floor import adds_floor, drives_on_floor
-from simulation.checks.overlaps import stand
-from simulation.checks.trial import try_robot
 from tests.faults.toy_robots import joint, link
 
 DRIVES = ("fetch", "fetch_driving", "mobile_panda")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from layouts import single
+from robot_layouts.simulation import Box, PhysicsSettings, Simulation
+from robot_layouts.simulation.checks.trial import try_robot
 from robots import RobotDescriptor
 from robots.from_urdf import guess_descriptor
-from simulation import Box, PhysicsSettings, Simulation
-from simulation.checks.trial import try_robot
 from tests.robots.test_guessing import knuckles, single_arm
 from tests.robots.urdf_parts import Parts
 

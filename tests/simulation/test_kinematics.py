@@ -7,9 +7,9 @@ import pytest
 import sapien
 
 from layouts import Layout, Placement
+from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotRegistry, SimulationError, UnknownNameError
-from simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
-from simulation.sapien3.world import BuiltWorld
 from tests.catalogue import QUICK
 
 # Robots whose TCP is a link; the others are refused, as a test below says.

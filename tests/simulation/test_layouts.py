@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from kinematics.quaternions import inverted, rotated
 from layouts import Layout, Placement, around_table, ceiling, grid, ring, side_by_side, wall
-from simulation import PhysicsSettings, Simulation, World
-from simulation.sapien3.world import BuiltWorld
+from robot_layouts.kinematics.quaternions import inverted, rotated
+from robot_layouts.simulation import PhysicsSettings, Simulation, World
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 
 MIXED = ("panda", "panda_stick", "so100")
 NINE = {f"arm_{i}": MIXED[i % len(MIXED)] for i in range(9)}

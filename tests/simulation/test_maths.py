@@ -1,4 +1,4 @@
-"""Shortcuts of `simulation.maths` give the bits of what they stand for."""
+"""Shortcuts of `robot_layouts.simulation.maths` give the bits of what they stand for."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from simulation.maths import added, arctan2, closeness, norm, tanh
+from robot_layouts.simulation.maths import added, arctan2, closeness, norm, tanh
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

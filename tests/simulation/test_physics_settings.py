@@ -8,9 +8,9 @@ import pytest
 
 import tasks
 from layouts import single
+from robot_layouts.simulation import SAPIEN_DEFAULTS, Friction, PhysicsSettings, Simulation
+from robot_layouts.simulation.physics import substeps
 from robots import SimulationError
-from simulation import SAPIEN_DEFAULTS, Friction, PhysicsSettings, Simulation
-from simulation.physics import substeps
 
 
 @pytest.mark.parametrize("field", [field.name for field in dataclasses.fields(PhysicsSettings)])

@@ -11,9 +11,9 @@ import pytest
 import torch
 
 import tasks
+from robot_layouts.simulation import maths
+from robot_layouts.simulation.sapien3 import exact_division
 from robots import SimulationError
-from simulation import maths
-from simulation.sapien3 import exact_division
 from tests.fresh_process import in_fresh_process
 
 
@@ -85,7 +85,8 @@ def test_a_library_that_is_not_loaded_is_missed(monkeypatch):
 @pytest.mark.long
 def test_worlds_of_a_portable_process_divide_exactly():
     code = (
-        "import tasks; from simulation.sapien3.exact_division import divide_exactly as d;"
+        "import tasks\n"
+        "from robot_layouts.simulation.sapien3.exact_division import divide_exactly as d\n"
         "tasks.make('PickCube-v1', obs_mode='none').close(); print(d.cache_info().misses)"
     )
     for before, divided in (((), "0"), ((sys.executable, "-m", "robots.portable"), "1")):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
+from robot_layouts.simulation.sapien3.kinematics.point_reach import PointReach
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotRegistry, UnknownNameError
-from simulation.sapien3.kinematics.point_reach import PointReach
-from simulation.sapien3.world import BuiltWorld
 from tests.catalogue import QUICK
 
 ROBOTS = QUICK

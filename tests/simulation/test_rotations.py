@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
-from simulation.maths import Floats
-from simulation.rotations import last_euler_angle, rotation_matrix
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.rotations import last_euler_angle, rotation_matrix
 
 
 def random_quaternions(count: int) -> Floats:

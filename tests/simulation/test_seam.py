@@ -14,9 +14,9 @@ import torch
 
 import tasks
 from layouts import single
+from robot_layouts.simulation.backend import SIMULATORS, Backend, open_backend
+from robot_layouts.simulation.sapien3.backend import SapienBackend, worlds_below
 from robots import RobotDescriptor, RobotRegistry, UnknownNameError
-from simulation.backend import SIMULATORS, Backend, open_backend
-from simulation.sapien3.backend import SapienBackend, worlds_below
 from tests.quick import quick_cases
 
 VERBS = [name for name in vars(Backend) if not name.startswith("_")]
@@ -93,7 +93,7 @@ def calls(monkeypatch: pytest.MonkeyPatch, task_id: str, num_envs: int) -> list[
         made.append(Verbs())
         return made[-1]
 
-    monkeypatch.setattr("simulation.simulation.open_backend", lambda _: backend())
+    monkeypatch.setattr("robot_layouts.simulation.simulation.open_backend", lambda _: backend())
     env = tasks.make(task_id, num_envs=num_envs)
     action = torch.zeros(env.action_space.shape)
     env.step(action)
@@ -170,8 +170,8 @@ def test_a_task_is_stepped_by_the_simulator_that_it_names(monkeypatch):
     class Other(SapienBackend):
         """SAPIEN under another name."""
 
-    monkeypatch.setattr("simulation.sapien3.backend.Other", Other, raising=False)
-    monkeypatch.setitem(SIMULATORS, "other", "simulation.sapien3.backend:Other")
+    monkeypatch.setattr("robot_layouts.simulation.sapien3.backend.Other", Other, raising=False)
+    monkeypatch.setitem(SIMULATORS, "other", "robot_layouts.simulation.sapien3.backend:Other")
     env = tasks.make("PushCube-v1", simulator="other")
     assert type(env.simulation.backend) is Other
     with pytest.raises(UnknownNameError, match="Did you mean 'sapien3'"):

@@ -4,10 +4,10 @@ import torch
 
 import tasks
 from layouts import single
+from robot_layouts.simulation import Simulation, State
+from robot_layouts.simulation.checks.overlaps import empty, stand
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError, UnknownNameError
-from simulation import Simulation, State
-from simulation.checks.overlaps import empty, stand
-from simulation.sapien3.backend import worlds_below
 from tasks import TaskEnv
 
 

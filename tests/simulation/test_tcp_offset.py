@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 import sapien
 
-from kinematics.rotations import rotate
 from layouts import Layout, Placement, single
 from layouts.validation.reach import Reach, Workspace
+from robot_layouts.kinematics.rotations import rotate
+from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.checks.overlaps import empty, stand
+from robot_layouts.simulation.checks.trial import tcp_error
+from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
+from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.state import with_means
 from robots import DescriptorError, RobotRegistry
 from robots.bodies.hulls import load_model
 from robots.grafting import with_tool
-from simulation import Simulation
-from simulation.checks.overlaps import empty, stand
-from simulation.checks.trial import tcp_error
-from simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
-from simulation.sapien3.world import BuiltWorld
-from simulation.state import with_means
 from tests.robots.urdf_parts import Parts
 
 OFFSET = (0.03, -0.02, 0.05)

@@ -10,10 +10,10 @@ import pytest
 
 from layouts import Layout, Placement
 from robot_layouts.__main__ import main
+from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.checks.overlaps import Causes, empty, stand, starting_overlaps
+from robot_layouts.simulation.checks.trial import TCP_ERROR, tcp_error, try_robot
 from robots import RobotDescriptor, RobotRegistry
-from simulation import Simulation
-from simulation.checks.overlaps import Causes, empty, stand, starting_overlaps
-from simulation.checks.trial import TCP_ERROR, tcp_error, try_robot
 from tests.three_links import arm, save
 
 
@@ -106,7 +106,9 @@ class TestCommand:
         assert "0.1 rad per step" in printed
 
     def test_what_is_wrong_is_its_exit_code(self, tmp_path, capsys, monkeypatch, small):
-        monkeypatch.setattr("simulation.checks.try_command.named_robot", lambda name: folded(small))
+        monkeypatch.setattr(
+            "robot_layouts.simulation.checks.try_command.named_robot", lambda name: folded(small)
+        )
         assert main(["robots", "inspect", "--try", "folded"]) == 1
         printed = capsys.readouterr().out
         assert "WRONG: the likely cause: at the start l" in printed

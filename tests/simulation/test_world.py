@@ -6,6 +6,13 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement, face_to_face, side_by_side, single
+from robot_layouts.simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
+from robot_layouts.simulation.control.joint_positions import JointPositionController
+from robot_layouts.simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.sapien3.blueprint import read_blueprint
+from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.scene.shapes import Capsule, Cylinder
+from robot_layouts.simulation.world import Body
 from robots import (
     DescriptorError,
     RobotDescriptor,
@@ -14,13 +21,6 @@ from robots import (
     UnknownNameError,
 )
 from robots.descriptor import ActionSplit
-from simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
-from simulation.control.joint_positions import JointPositionController
-from simulation.sapien3.backend import worlds_below
-from simulation.sapien3.blueprint import read_blueprint
-from simulation.sapien3.world import BuiltWorld
-from simulation.scene.shapes import Capsule, Cylinder
-from simulation.world import Body
 
 HALF = 0.02
 
@@ -224,7 +224,7 @@ def test_a_urdf_is_read_once_for_all_worlds_and_keeps_none_of_them_alive(monkeyp
         read.append((descriptor.name, blueprint))
         return blueprint
 
-    monkeypatch.setattr("simulation.sapien3.world.read_blueprint", reading)
+    monkeypatch.setattr("robot_layouts.simulation.sapien3.world.read_blueprint", reading)
     layout = side_by_side({"left": "panda", "right": "panda_stick"}, spacing=1.0)
     simulation = Simulation(layout, with_cube, 3)
     simulation.rebuild([1, 2], with_cube)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from layouts import single
-from simulation import Box
+from robot_layouts.simulation import Box
 from tasks import Cube
 from tests.tasks.mistakes import Mistake, building, in_turn, remembering, responding, sampling
 

@@ -10,13 +10,10 @@ import numpy as np
 import pytest
 import torch
 
-import experts
 import layouts
-import motion
 import robots
-import rollouts
-import simulation
 import tasks
+from robot_layouts import data, experts, motion, simulation
 from robots import ActionError, TaskError, UnknownNameError
 from tasks import maths, vocabulary
 
@@ -146,7 +143,7 @@ def test_help_shows_what_there_is():
     assert "A task by its id" in text
 
 
-ROOMS = (experts, layouts, motion, robots, rollouts, simulation, tasks)
+ROOMS = (experts, layouts, motion, robots, data, simulation, tasks)
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.__name__)

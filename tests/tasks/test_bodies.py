@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import tasks
+from robot_layouts.simulation import Box, Friction, Sphere
+from robot_layouts.simulation.scene.shapes import Finish
 from robots import SimulationError, TaskError
-from simulation import Box, Friction, Sphere
-from simulation.scene.shapes import Finish
 from tasks.language.bodies import Area, Ball, Compound, Cube, Cuboid, Peg
 
 

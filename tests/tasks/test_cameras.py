@@ -11,9 +11,9 @@ import torch
 from gymnasium.utils.env_checker import check_env
 
 import tasks
+from robot_layouts.simulation import Camera
+from robot_layouts.simulation.rendering.pictures import Observers, vulkan_problem
 from robots import SimulationError, TaskError
-from simulation import Camera
-from simulation.rendering.pictures import Observers, vulkan_problem
 from tests.fresh_process import in_fresh_process
 from tests.simulation.test_rendering import run_without_driver
 
@@ -40,7 +40,8 @@ def test_states_need_nothing_that_draws():
         "import sys, tasks\n"
         "for mode in ('state', 'state_dict', 'none'):\n"
         "    tasks.make('PickCube-v1', obs_mode=mode).reset(seed=0)\n"
-        "drawing = ('simulation.rendering.pictures', 'simulation.sapien3.visuals')\n"
+        "room = 'robot_layouts.simulation'\n"
+        "drawing = (f'{room}.rendering.pictures', f'{room}.sapien3.visuals')\n"
         "print([m for m in drawing if m in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -7,9 +7,9 @@ import tasks
 from layouts import single
 from parity.episodes import random_episodes
 from parity.lockstep import HISTORIES
+from robot_layouts.data.playing.plan_conversion import as_positions
+from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import CONTROL_MODES, DescriptorError, RobotRegistry, TaskError, UnknownNameError
-from rollouts.playing.plan_conversion import as_positions
-from simulation.sapien3.world import BuiltWorld
 from tasks.episode import Episode, play
 from tests.catalogue import every_robot
 from tests.motions import touching_episode

@@ -13,6 +13,8 @@ import tasks
 from layouts import Layout, Placement
 from parity.episodes import random_episodes
 from parity.lockstep import HISTORIES, NativeSide
+from robot_layouts.data.playing.mode_conversion import converted_steps
+from robot_layouts.simulation import PhysicsSettings, Simulation
 from robots import (
     CONTROL_MODES,
     ActionError,
@@ -22,8 +24,6 @@ from robots import (
     TaskError,
     UnknownNameError,
 )
-from rollouts.playing.mode_conversion import converted_steps
-from simulation import PhysicsSettings, Simulation
 from tasks.episode import Episode, play
 from tasks.registry import make_scenario
 from tests.motions import touching_episode

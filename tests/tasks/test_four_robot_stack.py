@@ -3,7 +3,7 @@
 import pytest
 
 import tasks
-from experts import find_expert
+from robot_layouts.experts import find_expert
 from tasks.originals.four_robot_stack import ORDER
 from tests.tasks.own import make, put
 

@@ -16,7 +16,7 @@ from robots import TaskError, UnknownNameError
 CHECKOUT = Path(__file__).parents[2]
 TRAY = '''
 import numpy as np
-from experts import register_expert
+from robot_layouts.experts import register_expert
 from layouts import face_to_face
 from tasks import MultiRobotTask, register_task
 

@@ -11,8 +11,8 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import tasks
+from robot_layouts.simulation.rendering.pictures import vulkan_problem
 from robots import TaskError, UnknownNameError
-from simulation.rendering.pictures import vulkan_problem
 from tasks import fronts
 from tasks.fronts.gymnasium import GymnasiumTask
 from tasks.registry import CATALOGUE

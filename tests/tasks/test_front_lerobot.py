@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert
+from robot_layouts.data import evaluate
+from robot_layouts.experts import find_expert
 from robots import TaskError
-from rollouts import evaluate
 from tasks.fronts.vector import UnknownAttributeError
 
 TASK = "TwoRobotPickCube-v1"

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert
+from robot_layouts.experts import find_expert
+from robot_layouts.simulation.rendering.pictures import vulkan_problem
 from robots import (
     ActionError,
     MissingPackageError,
@@ -16,7 +17,6 @@ from robots import (
     TaskError,
     UnknownNameError,
 )
-from simulation.rendering.pictures import vulkan_problem
 
 pytest.importorskip("stable_baselines3")
 

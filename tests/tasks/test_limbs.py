@@ -10,8 +10,8 @@ import pytest
 import torch
 
 import tasks
-from experts import Rehearsal, Waypoint, find_expert
 from layouts import Layout, Placement
+from robot_layouts.experts import Rehearsal, Waypoint, find_expert
 from robots import TaskError, UnknownNameError
 from tasks.registry import TASKS
 from tests.catalogue import optional_problem

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError, TaskError
-from simulation.sapien3.backend import worlds_below
 from tasks.maniskill.pick_cube import PickCube
 from tests.tasks.made import STILL, make
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import tasks
-from simulation import State
+from robot_layouts.simulation import State
 
 STEPS, ENVS = 12, 3
 

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 import tasks
-from simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from tasks.maniskill.peg_insertion_side import HALF_LENGTH, RADIUS, PegDesign
 
 

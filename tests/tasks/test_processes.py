@@ -20,9 +20,9 @@ import pytest
 
 import tasks
 from benchmarks.soak import read_level
+from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import RobotLayoutsError, SimulationError, TaskError
-from simulation.rendering.pictures import vulkan_problem
-from simulation.sapien3.backend import worlds_below
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
 from tasks.processes.start import ProcessError

@@ -10,9 +10,9 @@ from torch import Tensor
 
 import tasks
 from layouts import single
+from robot_layouts.simulation import Friction, PhysicsSettings, State, World
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import TaskError, UnknownNameError
-from simulation import Friction, PhysicsSettings, State, World
-from simulation.sapien3.backend import worlds_below
 from tasks.engine.making import ScenarioFields
 from tasks.registry import TASKS
 

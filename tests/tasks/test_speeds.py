@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError
-from simulation.sapien3.backend import worlds_below
 from tasks.engine.speeds import SpeedWatch
 from tasks.maniskill.two_robot_pick_cube import TwoRobotPickCube
 from tests.tasks.made import STILL, make

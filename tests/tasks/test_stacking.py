@@ -3,7 +3,7 @@ import pytest
 import torch
 
 import tasks
-from simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from tasks import TaskEnv
 
 HALF = 0.02

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert
-from experts.originals.two_robot_lift_bar import STYLES, _script
-from experts.rehearsal import Rehearsal
-from simulation import State
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.originals.two_robot_lift_bar import STYLES, _script
+from robot_layouts.experts.rehearsal import Rehearsal
+from robot_layouts.simulation import State
 from tasks.episode import play
 from tests.tasks.own import look, make, put
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import tasks
-from experts import find_expert
-from experts.geometry import gripper_facing
-from experts.script import Scene
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.geometry import gripper_facing
+from robot_layouts.experts.script import Scene
+from robot_layouts.simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from robots import TaskError
-from simulation.sapien3.backend import worlds_below
-from simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from tests.tasks.own import look, make, put
 
 TASK = "TwoRobotPushPick-v1"

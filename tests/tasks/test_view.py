@@ -5,12 +5,12 @@ import pytest
 
 import tasks
 from benchmarks.teleop import served
-from kinematics.rotations import pose_matrix
 from layouts import single
 from layouts.viewer.saved import NO_SLIDERS, save_html
-from simulation import Box, Capsule, Cylinder, Sphere
-from simulation.sapien3.world import BuiltWorld
-from simulation.world import Body
+from robot_layouts.kinematics.rotations import pose_matrix
+from robot_layouts.simulation import Box, Capsule, Cylinder, Sphere
+from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.world import Body
 from tasks.__main__ import main
 from tasks.view import body_parts, task_cell
 

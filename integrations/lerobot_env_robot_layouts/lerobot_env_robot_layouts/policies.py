@@ -1,4 +1,4 @@
-"""Policies of LeRobot as `rollouts.evaluate` takes them: observation → action."""
+"""Policies of LeRobot as `robot_layouts.data.evaluate` takes them: observation → action."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tasks.fronts.lerobot import renamed
 class LeRobotPolicy:
     """Acts on what ``obs_mode="lerobot"`` observes, as ``lerobot-eval`` lets it act.
 
-    `rollouts.evaluate` plays each episode with a copy of it, which has seen nothing yet.
+    `robot_layouts.data.evaluate` plays each episode with a copy of it, which has seen nothing yet.
     """
 
     def __init__(self, policy: PreTrainedPolicy, prepare: Any, finish: Any, task: str) -> None:

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from kinematics.quaternions import quaternion_rpy
-from kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of
 from layouts.export.cell import ExportedCell, Inertial, RobotSource, Standing
 from layouts.export.meshes import MeshFolder, drawn_meshes, solid_shapes
 from layouts.export.ros2.names import WORLD, RosNames
 from layouts.visuals import GREY, Rgba
+from robot_layouts.kinematics.quaternions import quaternion_rpy
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of
 from robots.urdf.model import ModelJoint
 
 XACRO = "http://www.ros.org/wiki/xacro"

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from xml.etree.ElementTree import Element, tostring
 
-from robots.common.errors import AssetError
+from robot_layouts.core.errors import AssetError
 from robots.urdf.cleaning.inertia import repair_inertia
 from robots.urdf.cleaning.joints import repair_joints
 from robots.urdf.cleaning.references import file_states, repair_references

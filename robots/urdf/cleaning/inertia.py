@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement
 
-from robots.common.errors import AssetError
+from robot_layouts.core.errors import AssetError
 from robots.urdf.checks import (
     MOMENTS,
     PRODUCTS,
@@ -23,7 +23,7 @@ from robots.urdf.paths import resolve
 from robots.urdf.text import numbers_of
 
 if TYPE_CHECKING:
-    from kinematics.rotations import Floats
+    from robot_layouts.kinematics.rotations import Floats
 
 DENSITY = 1000.0  # kg/m³; what SAPIEN takes for collision shapes
 THINNEST = 1e-3  # m; of a body whose shapes are thinner
@@ -149,7 +149,7 @@ def _corners(element: Element, where: str, urdf: str) -> Floats | None:
     """Return the corners of what a shape fills in the link's frame, (n, 3) (m), or None."""
     import numpy as np
 
-    from kinematics.rotations import rpy_pose
+    from robot_layouts.kinematics.rotations import rpy_pose
 
     try:
         own = _own_corners(element, where, urdf)

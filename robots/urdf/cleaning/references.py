@@ -10,8 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from robots.common.errors import AssetError, UnreadableFileError
-from robots.common.files import read_regular
+from robot_layouts.core.errors import AssetError, UnreadableFileError
+from robot_layouts.core.files import read_regular
 from robots.urdf.paths import resolve
 from robots.urdf.text import parse_xml
 

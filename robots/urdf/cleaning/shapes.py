@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from copy import deepcopy
 from xml.etree.ElementTree import Element, SubElement
 
-from robots.common.errors import AssetError
+from robot_layouts.core.errors import AssetError
 from robots.urdf.checks import SMALLEST_SIZE, attributes_of, sizes_of
 from robots.urdf.mesh_files import has_body
 from robots.urdf.model import SIZES

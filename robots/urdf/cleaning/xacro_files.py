@@ -19,7 +19,7 @@ from typing import Any
 from urllib.parse import parse_qsl, urlencode
 from xml.etree.ElementTree import Element, fromstring
 
-from robots.common.errors import AssetError, MissingPackageError
+from robot_layouts.core.errors import AssetError, MissingPackageError
 from robots.urdf.cleaning.references import find_package
 
 XACRO = "/xacro"  # what its namespaces end in: http://www.ros.org/wiki/xacro, …

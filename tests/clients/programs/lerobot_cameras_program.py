@@ -26,8 +26,8 @@ from tray_recording import (
     record,
 )
 
-from rollouts.export.dataset import Export, export
-from rollouts.reading.recording import Recording
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.data.reading.recording import Recording
 
 sys.path.insert(0, str(ROOT / "integrations" / "lerobot_env_robot_layouts"))
 

@@ -8,9 +8,9 @@ import numpy as np
 from lerobot_commands import evaluated, successes, train
 from lerobot_env_robot_layouts import LeRobotPolicy
 
-from rollouts import evaluate
-from rollouts.export.dataset import Export, export
-from rollouts.recording.record import record
+from robot_layouts.data import evaluate
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.data.recording.record import record
 
 TASK, SIZE, STEPS = "TwoRobotPickCube-v1", (64, 48), 8
 CAMERAS = {"base_camera", "left.hand_camera", "right.hand_camera"}

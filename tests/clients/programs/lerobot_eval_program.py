@@ -8,10 +8,10 @@ import numpy as np
 from lerobot_commands import command, evaluated, install_replay, successes, train
 from lerobot_env_robot_layouts import LeRobotPolicy, RobotLayoutsEnv
 
-from rollouts import evaluate
-from rollouts.export.dataset import Export, export
-from rollouts.reading.recording import Recording
-from rollouts.recording.record import record
+from robot_layouts.data import evaluate
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.recording.record import record
 from tasks.fronts.lerobot import STATES
 
 TASK = "TwoRobotPickCube-v1"

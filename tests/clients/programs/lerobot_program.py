@@ -14,8 +14,8 @@ from lerobot.policies.factory import make_policy, make_pre_post_processors
 from lerobot.scripts.lerobot_eval import rollout
 from lerobot.utils.import_utils import register_third_party_plugins
 
-from rollouts.export.dataset import Export, export
-from rollouts.recording.record import record
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.data.recording.record import record
 
 TASK = "PushCube-v1"
 

@@ -24,8 +24,8 @@ from tray_recording import (
     record,
 )
 
-from rollouts.export.dataset import Export, export
-from rollouts.reading.recording import Recording
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.data.reading.recording import Recording
 
 FAR = 3000.0  # mm, that counts as 1 in what the network sees
 KEYS = [camera.replace(".", "_") for camera in CAMERAS]

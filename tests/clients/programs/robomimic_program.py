@@ -11,8 +11,8 @@ from robomimic.config import config_factory
 from robomimic.utils import file_utils, obs_utils
 from robomimic.utils.dataset import SequenceDataset
 
-from rollouts.export.dataset import Export, export
-from rollouts.recording.record import record
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.data.recording.record import record
 
 TASK = "PushCube-v1"
 

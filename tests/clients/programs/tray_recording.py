@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import tasks
-from rollouts.reading.recording import Trajectory
-from rollouts.recording.recorder import Recorder
+from robot_layouts.data.reading.recording import Trajectory
+from robot_layouts.data.recording.recorder import Recorder
 from tasks.episode import play
 
 ROOT = Path(__file__).parents[3]

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
-from kinematics.rotations import pose_matrix
 from layouts.export.cell import ExportedCell
+from robot_layouts.kinematics.rotations import pose_matrix
 from robots.bodies.hulls import load_model
 from tests.layouts.travelling import EXACT, cells, draws
 

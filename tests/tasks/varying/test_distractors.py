@@ -8,9 +8,9 @@ import pytest
 import torch
 
 import tasks
+from robot_layouts.simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.scene.parts import Part
 from robots import TaskError, UnknownNameError
-from simulation.sapien3.backend import worlds_below
-from simulation.scene.parts import Part
 from tasks import Camera, Distractors, Light, Randomization, TaskEnv, Uniform, Whole
 
 NAMES = [f"distractor_{i}" for i in range(4)]

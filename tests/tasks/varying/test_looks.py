@@ -8,8 +8,8 @@ import pytest
 import torch
 
 import tasks
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import TaskError, UnknownNameError
-from simulation.sapien3.backend import worlds_below
 from tasks import (
     Camera,
     CameraShift,

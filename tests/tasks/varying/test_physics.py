@@ -8,7 +8,7 @@ import pytest
 import torch
 
 import tasks
-from simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from tasks import Fixed, Normal, Randomization, Shift, TaskEnv, Whole
 
 TASK = "PickCube-v1"

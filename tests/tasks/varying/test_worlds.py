@@ -9,7 +9,7 @@ import pytest
 import torch
 
 import tasks
-from simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from tasks import LogUniform, Randomization, TaskEnv, Uniform
 from tests.tasks.varying.declarations import IN_PLACE, TASK, VARIED
 

@@ -5,14 +5,14 @@ from math import pi
 
 import numpy as np
 
-from experts import register_expert
-from experts.geometry import gripper_facing, turn, yaw_of
-from experts.grasps import bringing, pick
-from experts.reaching import reaching
-from experts.rehearsal import first_success
-from experts.script import CLOSED, Waypoint
-from kinematics.rotations import rotate
 from layouts import Layout, Placement, face_to_face
+from robot_layouts.experts import register_expert
+from robot_layouts.experts.geometry import gripper_facing, turn, yaw_of
+from robot_layouts.experts.grasps import bringing, pick
+from robot_layouts.experts.reaching import reaching
+from robot_layouts.experts.rehearsal import first_success
+from robot_layouts.experts.script import CLOSED, Waypoint
+from robot_layouts.kinematics.rotations import rotate
 from tasks import Area, Cuboid, Goal, MultiRobotTask, Needs, closeness, register_task
 from tasks.maths import maximum, norm, where
 

@@ -1,0 +1,132 @@
+"""Files and folders that appear whole or not at all, and what the disk refuses, in words."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import shutil
+from collections.abc import Generator
+from contextlib import contextmanager, nullcontext, suppress
+from itertools import count
+from pathlib import Path
+
+from robot_layouts.core.errors import RobotLayoutsError, UnwritableFileError
+
+PARTIAL = ".partial"  # in the names of files and folders that are not whole yet
+
+_numbers = count()
+
+
+@contextmanager
+def written_whole(
+    path: str | os.PathLike[str],
+    error: type[RobotLayoutsError] | None = UnwritableFileError,
+    *,
+    partial: Path | None = None,
+    parents: bool = True,
+    sync: bool = False,
+) -> Generator[Path]:
+    """Give a path beside the target to write to; it takes the target's place at the end.
+
+    It may become a file, or a folder, which takes the place of nothing or of an empty folder.
+    After an error the target is as it was, and nothing else is left.
+
+    Args:
+        path: The target.
+        error: Raised if the disk refuses; None leaves the operating system's errors as they are.
+        partial: The path to write to, on the same file system; left out, one that nobody else
+            uses.
+        parents: Whether to make the folder that it is in.
+        sync: Whether to wait until a file is on the disk before it takes the target's place.
+
+    Raises:
+        RobotLayoutsError: The given error, if it cannot be written.
+        OSError: If so, and no error is given.
+    """
+    target = Path(path)
+    partial = partial or _beside(target)
+    with writing_errors(target, error) if error else nullcontext():
+        if "\0" in str(target):
+            raise OSError(errno.EINVAL, "a null character is in its name")
+        if parents:
+            _make_parent(target)
+        try:
+            yield partial
+            if sync:
+                _sync(partial)
+            os.replace(partial, target)
+        except BaseException:
+            remove(partial)
+            raise
+
+
+def write_whole(
+    path: str | os.PathLike[str],
+    content: str | bytes,
+    error: type[RobotLayoutsError] = UnwritableFileError,
+    *,
+    parents: bool = True,
+) -> None:
+    """Write a file, text as UTF-8; see `written_whole`.
+
+    Raises:
+        RobotLayoutsError: The given error, if it cannot be written.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    with written_whole(path, error, parents=parents) as partial:
+        partial.write_bytes(data)
+
+
+@contextmanager
+def writing_errors(
+    path: str | os.PathLike[str],
+    error: type[RobotLayoutsError] = UnwritableFileError,
+    kinds: tuple[type[Exception], ...] = (OSError,),
+) -> Generator[None]:
+    """Turn what the disk refuses into one of our errors, which names the path.
+
+    Args:
+        path: What is written.
+        error: The error to raise.
+        kinds: What a refusal looks like; our own errors are left as they are.
+    """
+    try:
+        yield
+    except RobotLayoutsError:
+        raise
+    except kinds as refusal:
+        raise error(f"cannot write {os.fspath(path)}: {_reason(refusal)}") from refusal
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a folder, if it is there and the disk lets it go."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with suppress(OSError):
+            path.unlink()
+
+
+def _beside(target: Path) -> Path:
+    return target.with_name(f"{target.name}.{os.getpid()}.{next(_numbers)}{PARTIAL}")
+
+
+def _make_parent(target: Path) -> None:
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise NotADirectoryError(error.errno, f"{target.parent} is no folder") from error
+
+
+def _sync(path: Path) -> None:
+    with path.open("rb") as stream:
+        os.fsync(stream.fileno())
+
+
+def _reason(refusal: Exception) -> str:
+    """Return what the operating system said, out of the page that HDF5 or Arrow make of it."""
+    number = re.search(r"errno = (\d+)", str(refusal))
+    if number is not None:
+        return os.strerror(int(number[1]))
+    return (refusal.strerror if isinstance(refusal, OSError) else None) or str(refusal)

@@ -1,0 +1,179 @@
+"""How well a policy does: whole episodes of a task, in worker processes or in this one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from errno import EISDIR
+from os import PathLike
+from pathlib import Path
+from statistics import mean
+from typing import TYPE_CHECKING, Any
+
+from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.writing import writing_errors
+from robot_layouts.data.playing.casting import Cast, cast_of
+from robot_layouts.data.playing.evaluation_job import EvaluationJob, scores_of
+from robot_layouts.data.playing.executor import EPISODE_SECONDS, Event, Executor, choose_executor
+from robot_layouts.data.playing.seeds import checked_seeds, seed_lines
+from robot_layouts.data.playing.together import grouped
+from robot_layouts.data.receipts.provenance import describe_job, receipt_of
+from robot_layouts.data.receipts.receipt import Receipt
+from robot_layouts.data.sources.policies import EXPERT
+from robots import TaskError
+from tasks import get_task_class
+from tasks.episode import Policy, Score
+from tasks.registry import make_scenario
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from tasks.engine.making import MakingFields
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """How episodes of a task went, by seed.
+
+    Attributes:
+        task: The task's id.
+        policy: Who played, in words.
+        scores: Seed → how its episode went, in the order in which the seeds were given.
+        receipt: The receipt, if one was asked for.
+    """
+
+    task: str
+    policy: str
+    scores: Mapping[int, Score]
+    receipt: Receipt | None = field(default=None, compare=False)
+
+    @property
+    def success_rate(self) -> float:
+        """The share of episodes that ended in success."""
+        return mean(self.successes.values())
+
+    @property
+    def successes(self) -> dict[int, bool]:
+        """Seed → whether the episode ended in success."""
+        return {seed: score.success for seed, score in self.scores.items()}
+
+    @property
+    def returns(self) -> dict[int, float]:
+        """Seed → sum of rewards."""
+        return {seed: score.total for seed, score in self.scores.items()}
+
+    @property
+    def reasons(self) -> dict[int, str]:
+        """Seed → why the episode failed, for those of which that is known: an expert's."""
+        return {seed: score.reason for seed, score in self.scores.items() if score.reason}
+
+    @property
+    def lengths(self) -> dict[int, int]:
+        """Seed → control steps."""
+        return {seed: score.steps for seed, score in self.scores.items()}
+
+    def __repr__(self) -> str:
+        """Show it as a few lines."""
+        failed = {seed: score.reason for seed, score in self.scores.items() if not score.success}
+        lines = [
+            f"{self.task}, {self.policy}: {len(self.scores) - len(failed)} of {len(self.scores)}"
+            f" episodes with success ({self.success_rate:.1%})",
+            "on average: return {:.2f} ({:.4g} to {:.4g})".format(*_spread(self.returns))
+            + ", {:.1f} steps ({} to {})".format(*_spread(self.lengths)),
+        ]
+        return "\n".join([*lines, *seed_lines("no success", failed)])
+
+
+def evaluate(
+    policy: Policy | str,
+    task: str,
+    seeds: Sequence[int],
+    *,
+    num_envs: int = 1,
+    workers: int | None = None,
+    executor: Executor | None = None,
+    episode_timeout: float | None = EPISODE_SECONDS,
+    receipt: str | PathLike[str] | None = None,
+    on_event: Callable[[Event], None] = lambda event: None,
+    **making: Unpack[MakingFields],
+) -> Evaluation:
+    """Let a policy play the episodes of some seeds, and tell how they went.
+
+    What comes out depends on nothing but the policy, the task and the seeds: every episode is
+    played in a world built anew by a copy of the policy as it was passed, and the random
+    generators of Python, NumPy and torch start from its seed. An episode ends with the first step
+    that is terminated or truncated.
+
+    Args:
+        policy: Maps the observation, (1, D) float32 if ``obs_mode`` is ``"state"``, to the action,
+            (A,) or (1, A). It can be pickled, unless ``workers`` is 0; what `copy.deepcopy` does
+            not copy, such as a function, is not copied for each episode. Or where one is imported
+            from, ``"module:name"``. Or ``"expert"``, which makes a plan for each seed and carries
+            it out; where it finds none, the episode is a failure of 0 steps, whose reason is given.
+        task: Id of the task.
+        seeds: Which episodes, each once.
+        num_envs: How many episodes each process plays at once, in environments of one task. The
+            policy is called, and copied, for each as if that were alone, so that the scores are
+            those of 1. A policy whose attribute ``batched`` is True is called once for all that
+            are running, observations (n, D) → actions (n, A), which is faster; it is neither
+            copied nor are its random numbers those of each seed.
+        workers: How many processes play; None: one for each core that this process may use; 0:
+            none, but this one.
+        executor: Who plays instead, such as `robot_layouts.data.playing.ray_executor.RayExecutor`.
+        episode_timeout: Seconds that an episode, or those played at once, may take in a worker
+            until that is ended and they are played again, three times in all; None if they may
+            take for ever.
+        receipt: File to write a receipt to, json that `verify` plays again.
+        on_event: Called with each event of the executor, to show progress.
+        making: Arguments of `tasks.make`, such as ``robots`` and ``obs_mode``.
+
+    Raises:
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that or has no expert, a number makes no sense,
+            or there are no seeds or one is there twice.
+        UnwritableFileError: If the receipt cannot be written.
+        AssetError: If the receipt needs robot files that cannot be found.
+        ReceiptError: If it needs files of the policy that cannot be read.
+        WorkerError: If the policy raised something, cannot be sent to the workers, or they die of
+            it again and again.
+    """
+    executor = choose_executor(workers, executor, episode_timeout)
+    cls, seeds = get_task_class(task), checked_seeds(seeds)
+    if not seeds:
+        raise TaskError("no seeds were given; an evaluation plays one or more")
+    checked_whole("num_envs", num_envs, 1, None, TaskError)
+    num_envs = min(num_envs, len(seeds))
+    (cast, imported), scenario = cast_of(policy, cls), make_scenario(cls, num_envs, **making)
+    scenario.check(cls.reward_modes)
+    job = EvaluationJob(cls, scenario, cast, grouped(seeds, num_envs), receipt is not None)
+    if receipt is None:
+        scores = scores_of(executor, job, on_event)
+        return Evaluation(cls.task_id, _name(cast), {seed: scores[seed] for seed in seeds})
+    described = _described(job, imported, receipt)
+    found = scores_of(executor, job, on_event)
+    written = receipt_of(described, job, {seed: found[seed] for seed in seeds})
+    written.write(receipt)
+    scores = {e.seed: Score(e.success, e.total, e.steps, e.reason) for e in written.episodes}
+    return Evaluation(cls.task_id, _name(cast), scores, written)
+
+
+def _described(job: EvaluationJob, name: str | None, path: str | PathLike[str]) -> dict[str, Any]:
+    """Return what is played for a receipt, and see, before anything is, that it can be written."""
+    with writing_errors(path):
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        if Path(path).is_dir():
+            raise IsADirectoryError(EISDIR, "it is a folder; a receipt is a file")
+    return describe_job(job, name)
+
+
+def _name(cast: Cast) -> str:
+    """Return who plays, in words."""
+    if cast.expert is not None:
+        return EXPERT
+    return getattr(cast.policy, "__qualname__", type(cast.policy).__qualname__)
+
+
+def _spread(by_seed: Mapping[int, float]) -> tuple[float, float, float]:
+    """Return mean, smallest and largest."""
+    values = by_seed.values()
+    return mean(values), min(values), max(values)

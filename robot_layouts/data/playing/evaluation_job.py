@@ -1,0 +1,127 @@
+"""Plays the episodes of an evaluation in workers, and keeps how they went."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from typing import Any, NoReturn
+
+import torch
+
+from robot_layouts.data.playing.casting import Cast, Casting
+from robot_layouts.data.playing.environment import environment
+from robot_layouts.data.playing.executor import Event, Executor, modules_of, play_all
+from robot_layouts.data.playing.state_trace import StateTrace, trace_of
+from robot_layouts.data.playing.together import one_by_one, play_together, states_together
+from tasks import MultiRobotTask, Scenario
+from tasks.episode import Score
+
+
+@dataclass(frozen=True)
+class TracedScore(Score):
+    """How an episode went, with a digest of its states.
+
+    Attributes:
+        trace: The digest.
+        environment: On what it was played; see `robot_layouts.data.playing.environment`.
+    """
+
+    trace: StateTrace = field(kw_only=True)
+    environment: Mapping[str, Any] = field(kw_only=True, compare=False)
+
+
+@dataclass(frozen=True)
+class EvaluationJob:
+    """Everything but the seed that decides an episode; can be pickled.
+
+    Attributes:
+        task: Class of the task.
+        scenario: How to make it.
+        cast: Who plays.
+        together: Seeds that are played at once, by the first of them.
+        traced: Whether each score is to be a `TracedScore`.
+        most_steps: Seed → steps after which its episode ends, if it has not ended before.
+    """
+
+    task: type[MultiRobotTask]
+    scenario: Scenario
+    cast: Cast
+    together: Mapping[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
+    traced: bool = False
+    most_steps: Mapping[int, int] = field(default_factory=dict[int, int])
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """What other machines may need to play it."""
+        return modules_of(self.task, *self.cast.members)
+
+    def __call__(self) -> Callable[[int], dict[int, Score]]:
+        """Make the task in a worker, and return what plays the episodes of a seed and others."""
+        torch.set_num_threads(1)  # as many everywhere, so that sums are the same
+        return _Play(self)
+
+
+class _Play:
+    """Plays episodes in the worlds of one task, which are built anew for each."""
+
+    def __init__(self, job: EvaluationJob) -> None:
+        self._job, self._env = job, job.task(job.scenario)
+        self._casting = Casting(job.cast, self._env)
+
+    def __call__(self, seed: int) -> dict[int, Score]:
+        """Play the episodes of a seed and of those that are played together with it."""
+        players = [self._casting(seed) for seed in self._job.together[seed]]
+        for player in players:
+            player.most = min(player.most, self._job.most_steps.get(player.seed, player.most))
+        with torch.no_grad():
+            if not self._job.traced:
+                play_together(self._env, players)
+                return {player.seed: player.score for player in players}
+            played = states_together(self._env, players)
+        return {
+            player.seed: TracedScore(
+                **vars(player.score), trace=trace_of(states), environment=environment()
+            )
+            for player, states in zip(players, played, strict=True)
+        }
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._env.close()
+        self._casting.close()
+
+
+def scores_of(
+    executor: Executor, job: EvaluationJob, on_event: Callable[[Event], None]
+) -> dict[int, Score]:
+    """Play all episodes of a job, and return how each went, by seed.
+
+    Args:
+        executor: Who plays.
+        job: What is played.
+        on_event: Called with each event of the executor, one for each episode.
+
+    Raises:
+        WorkerError: If an episode cannot be played.
+    """
+    scores: dict[int, Score] = {}
+    with closing(play_all(executor, job, list(job.together))) as events:
+        for event in events:
+            for single in one_by_one(event):
+                on_event(single)
+                if single.seed is not None and isinstance(single.result, Score):
+                    scores[single.seed] = single.result
+            if event.error is not None:
+                seeds = [event.seed] if event.seed is None else job.together[event.seed]
+                _raise(event.error, seeds)
+    return scores
+
+
+def _raise(error: Exception, seeds: Sequence[int | None]) -> NoReturn:
+    """Raise an error that says at which seeds it happened."""
+    which = (
+        f"seed {seeds[0]}" if len(seeds) == 1 else f"one of the seeds {', '.join(map(str, seeds))}"
+    )
+    error.args = (f"{which}: {error}", *error.args[1:])
+    raise error

@@ -1,0 +1,191 @@
+"""Who plays whole episodes: worker processes that may die, or this process."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
+from typing import Any, Protocol
+
+from robot_layouts.data.playing.scheduler import (
+    DEATHS_ALLOWED,
+    EPISODE_SECONDS,
+    START_SECONDS,
+    Event,
+    Play,
+    RetryPolicy,
+    Scheduler,
+    WorkerError,
+    WorkersDied,
+    check_count,
+)
+from robots import TaskError
+from tasks.processes.transport import packed
+from tasks.processes.worker import Pool, Reply, Worker, report
+
+__all__ = [
+    "DEATHS_ALLOWED",
+    "EPISODE_SECONDS",
+    "Event",
+    "Executor",
+    "Play",
+    "ProcessExecutor",
+    "WorkerError",
+    "WorkersDied",
+    "choose_executor",
+    "modules_of",
+    "play_all",
+    "report",
+]
+
+_PATIENCE = 10.0  # s that a worker may take to end by itself
+
+
+class Executor(Protocol):
+    """Something that plays whole episodes somewhere: in processes, or on other machines.
+
+    Episodes must depend on nothing but their seed and what ``prepare`` holds.
+    """
+
+    def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
+        """Play the episode of every seed, in any order.
+
+        Args:
+            prepare: Called once in every worker; makes what plays there. It can be pickled. If it
+                has ``modules``, other machines may need these.
+            seeds: Which episodes.
+
+        Yields:
+            One event with a result or an error for every seed, as they end, one for every worker
+            that died, and notes meanwhile.
+
+        Raises:
+            WorkerError: If no worker can be had.
+            RobotLayoutsError: What ``prepare`` raised.
+        """
+        ...
+
+
+class ProcessExecutor:
+    """Processes of this machine; none is left when `run` ends, whatever ends it."""
+
+    def __init__(
+        self,
+        workers: int | None = 1,
+        *,
+        attempts: int = DEATHS_ALLOWED,
+        fresh: bool = False,
+        episode_timeout: float | None = EPISODE_SECONDS,
+    ) -> None:
+        """Choose how many processes play.
+
+        Args:
+            workers: How many at a time; None: one for each core that this process may use.
+            attempts: How many workers may die of one episode before it is given up.
+            fresh: Whether every episode gets a process of its own.
+            episode_timeout: Seconds that an episode may take, or from one `report` to the next,
+                until its worker is ended, which counts as a death; None if it may take for ever.
+
+        Raises:
+            TaskError: If a number is not valid.
+        """
+        if workers is not None:
+            check_count("workers", workers, 1)
+        self.workers = len(os.sched_getaffinity(0)) if workers is None else workers
+        self._policy = RetryPolicy(attempts, fresh, episode_timeout)
+
+    def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
+        """Play the episode of every seed; see `Executor`."""
+        return Scheduler(_Processes(prepare), seeds, self.workers, self._policy).events()
+
+
+class _Processes:
+    """The backend of this machine, whose workers all play the same."""
+
+    def __init__(self, prepare: Callable[[], Play]) -> None:
+        """Take what makes the plays.
+
+        Raises:
+            WorkerError: If it cannot be sent to processes.
+        """
+        self._job, self._pool = packed(prepare), Pool()
+
+    def spawn(self) -> Worker:
+        """Start a process."""
+        return self._pool.spawn(self._job, START_SECONDS)
+
+    def wait(self, seconds: float) -> list[tuple[Worker, Reply]]:
+        """Wait for replies for a while (s)."""
+        return self._pool.wait(seconds)
+
+    def remove(self, worker: Worker, *, kill: bool) -> None:
+        """End a process."""
+        self._pool.remove(worker, 0.0 if kill else _PATIENCE)
+
+    def status(self) -> str:
+        """Return nothing: the workers are all that there is."""
+        return ""
+
+
+def choose_executor(
+    workers: int | None = None,
+    executor: Executor | None = None,
+    episode_timeout: float | None = EPISODE_SECONDS,
+) -> Executor:
+    """Return who plays.
+
+    Args:
+        workers: How many processes; 0: none, but this one; None: one for each core.
+        executor: Who plays instead, as it was made.
+        episode_timeout: See `ProcessExecutor`.
+
+    Raises:
+        TaskError: If a number is not valid, or contradicts the executor.
+    """
+    if workers is not None:
+        check_count("workers", workers, 0)
+    limited = episode_timeout != EPISODE_SECONDS
+    if executor is not None:
+        if workers is not None or limited:
+            raise TaskError(
+                "an executor knows its own workers and episode_timeout; pass them where you make it"
+            )
+        return executor
+    if workers == 0:
+        if limited and episode_timeout is not None:
+            raise TaskError(
+                f"episode_timeout is {episode_timeout!r}, but with workers=0 this process plays,"
+                " and nothing could end it; take workers=1"
+            )
+        from robot_layouts.data.playing.in_process import InProcessExecutor  # needs torch
+
+        return InProcessExecutor()
+    return ProcessExecutor(workers, episode_timeout=episode_timeout)
+
+
+def play_all(
+    executor: Executor, prepare: Callable[[], Play], seeds: Sequence[int]
+) -> Generator[Event]:
+    """Play the episode of every seed; see `Executor`.
+
+    Raises:
+        WorkerError: If the executor ends without a result or an error for each, besides what it
+            raises itself.
+    """
+    left: set[int | None] = set(seeds)
+    with closing(executor.run(prepare, seeds)) as events:
+        for event in events:
+            if event.result is not None or event.error is not None:
+                left.discard(event.seed)
+            yield event
+    if left:
+        raise WorkerError(
+            f"{type(executor).__name__} ended before {len(left)} of {len(seeds)} episodes were"
+            " played"
+        )
+
+
+def modules_of(*things: Any) -> tuple[str, ...]:
+    """Return the modules that define classes, functions, or the classes of other things."""
+    known = (thing if hasattr(thing, "__module__") else type(thing) for thing in things)
+    return tuple(dict.fromkeys(str(thing.__module__) for thing in known))

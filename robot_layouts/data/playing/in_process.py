@@ -1,0 +1,68 @@
+"""Plays whole episodes in this very process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterable
+from typing import Any
+
+import torch
+
+from robot_layouts.data.playing.randomness import random_states, set_random_states
+from robot_layouts.data.playing.scheduler import Event, Play
+from tasks.processes.transport import as_ours
+
+
+class InProcessExecutor:
+    """This very process, one episode after the other; what plays need not be picklable.
+
+    Nothing limits how long an episode takes. The number of torch's threads and the state of the
+    random generators are those of before whenever nothing is being played. If what plays has a
+    method ``close``, that is called in the end.
+    """
+
+    def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
+        """Play the episode of every seed; see `robot_layouts.data.playing.executor.Executor`."""
+        inside = _Inside()
+        with inside:
+            play = prepare()
+        try:
+            for seed in seeds:
+                with inside:
+                    event = _played(play, seed)
+                yield event
+        finally:
+            close = getattr(play, "close", None)
+            if close is not None:
+                close()
+
+
+def _played(play: Play, seed: int) -> Event:
+    try:
+        return Event(seed, result=play(seed), worker="this process")
+    except Exception as error:
+        return Event(seed, error=as_ours(error), worker="this process")
+
+
+class _Inside:
+    """What a play sets for the whole process, put aside while it is not playing."""
+
+    def __init__(self) -> None:
+        self._settings: tuple[Any, ...] | None = None
+
+    def __enter__(self) -> None:
+        self._outside = _settings()
+        if self._settings is not None:
+            _set(*self._settings)
+
+    def __exit__(self, *error: object) -> None:
+        self._settings = _settings()
+        _set(*self._outside)
+
+
+def _settings() -> tuple[Any, ...]:
+    return torch.get_num_threads(), random_states()
+
+
+def _set(threads: int, states: tuple[Any, ...]) -> None:
+    torch.set_num_threads(threads)
+    set_random_states(states)

@@ -1,0 +1,167 @@
+"""Plays recorded actions again, and says whether the same happens."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from robot_layouts.data.playing.comparison import Difference, first_difference
+from robot_layouts.data.reading.recorded_task import task_class, task_for
+from robot_layouts.data.reading.recording import FILE, Recording, Trajectory, TrajectoryError
+from robots import TaskError
+from tasks import TaskEnv, get_task_class
+from tasks.episode import play
+
+Start = Literal["seed", "state"]
+STARTS: tuple[Start, ...] = ("seed", "state")
+
+__all__ = [
+    "FILE",
+    "STARTS",
+    "Replayed",
+    "Start",
+    "find_official",
+    "open_recording",
+    "replay",
+    "task_for",
+]
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """The result of an episode that was played again.
+
+    Attributes:
+        episode_id: Its number in the file.
+        seed: Seed of its reset, if it has one.
+        steps: Its control steps.
+        recorded: Whether the recorded episode ended in success, or None if the file is silent.
+        success: Whether it ended in success here.
+        compared: Whether the file holds states to compare with.
+        difference: Where it differs first, or None.
+        exact: Whether the states must be equal to the last bit.
+        varied_alike: Whether what varies in its world was drawn here as it was recorded.
+    """
+
+    episode_id: int
+    seed: int | None
+    steps: int
+    recorded: bool | None
+    success: bool
+    compared: bool
+    difference: Difference | None
+    exact: bool
+    varied_alike: bool = True
+
+    @property
+    def agrees(self) -> bool:
+        """Whether success and world are as recorded, and states are where they must be."""
+        if self.recorded not in (None, self.success) or not self.varied_alike:
+            return False
+        return not (self.exact and self.difference)
+
+
+def open_recording(path: Path | None, task_id: str | None) -> Recording:
+    """Open a recording: a file, all files in a folder, or else the official one of a task.
+
+    Raises:
+        TrajectoryError: If there is none, or it cannot be read or is of another task.
+        UnknownNameError: If there is no such task.
+    """
+    if path is None:
+        if task_id is None:
+            raise TaskError("neither a file nor a task is given to replay")
+        path = find_official(get_task_class(task_id).task_id)
+    file = Recording(path)
+    try:
+        task_class(file, task_id)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def official_folder() -> Path:
+    """Return where ManiSkill keeps demonstrations: ``$MS_ASSET_DIR/demos``."""
+    return Path(os.environ.get("MS_ASSET_DIR", "~/.maniskill")).expanduser() / "demos"
+
+
+def find_official(task_id: str) -> Path:
+    """Return the official demonstrations of a task that can be played here.
+
+    Those recorded on the CPU come first: a seed means the same there as here.
+
+    Raises:
+        TrajectoryError: If there are none; says why each that is there cannot be played.
+    """
+    folder = official_folder() / task_id
+    playable: list[tuple[bool, Path]] = []
+    reasons: list[str] = []
+    for path in sorted(folder.rglob("*.h5")):
+        try:
+            with Recording(path) as file:
+                other = file.env_kwargs.get("sim_backend", "physx_cpu") != "physx_cpu"
+                playable.append((other, path))
+        except TrajectoryError as error:
+            reasons.append(f"\n  {error}")
+    if not playable:
+        raise TrajectoryError(
+            f"there is no recording of {task_id} in {folder} that can be played; give a file, or"
+            f" record one with `robot-layouts record`{''.join(reasons)}"
+        )
+    return min(playable)[1]
+
+
+def replay(
+    task: TaskEnv,
+    trajectory: Trajectory,
+    start: Start = "seed",
+    *,
+    everything: bool = False,
+    watch: Callable[[], None] = lambda: None,
+) -> Replayed:
+    """Play the actions of a recorded episode again, and compare.
+
+    Args:
+        task: A task with one environment; see `task_for`.
+        trajectory: The episode.
+        start: ``"seed"`` resets with its seed, ``"state"`` then puts everything into the first
+            recorded state. The latter is not exact, as PhysX's memory is not part of a state.
+        everything: Whether to compare rewards, flags and what was varied, too, not states alone.
+        watch: Called after the reset and after every step.
+
+    Raises:
+        TrajectoryError: If the file does not say the seed, or has no states to start from.
+    """
+    states = trajectory.states
+    if start == "state" and states is None:
+        raise _refusal(trajectory, "holds no states; start from its seed")
+    if start == "seed" and trajectory.seed is None:
+        raise _refusal(trajectory, "has no reset seed; start from its state")
+    first = {
+        kind: {name: rows[:1] for name, rows in entries.items()}
+        for kind, entries in (states or {}).items()
+    }
+    begin = first if start == "state" else None
+    episode = play(task, trajectory.seed or 0, trajectory.actions, watch, start=begin)
+    compared = states is not None
+    return Replayed(
+        episode_id=trajectory.episode_id,
+        seed=trajectory.seed,
+        steps=len(trajectory.actions),
+        recorded=trajectory.solved,
+        success=episode.solved,
+        compared=compared,
+        difference=(
+            first_difference(trajectory, episode, everything=everything) if compared else None
+        ),
+        exact=start == "seed" and trajectory.rebuilt,
+        varied_alike=trajectory.drawn in (None, episode.drawn),
+    )
+
+
+def _refusal(trajectory: Trajectory, why: str) -> TrajectoryError:
+    return TrajectoryError(f"traj_{trajectory.episode_id} {why}")

@@ -1,0 +1,304 @@
+"""Plays the episodes of several seeds in one task, each as if it were alone."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from math import fsum
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from robot_layouts.data.playing.randomness import random_states, set_random_states
+from robot_layouts.data.playing.scheduler import Event
+from robots import ActionError, TaskError
+from tasks import TaskEnv
+from tasks.engine.actions import ActionReader
+from tasks.episode import REBUILT, Moment, PlayedEpisode, Policy, Score, States
+
+Row = NDArray[np.float32]
+
+
+class BatchError(TaskError):
+    """A batched policy did not return one action for each observation."""
+
+
+class Choice(NamedTuple):
+    """What is carried out in a step of an episode.
+
+    Attributes:
+        action: The action, (A,).
+        turn: 0 if the policy acted, 1 if another took over.
+        correction: What the corrector would have done, (A,), or None.
+    """
+
+    action: Row
+    turn: int = 0
+    correction: Row | None = None
+
+
+@dataclass
+class Player:
+    """Who plays the episode of a seed, and what has happened in it.
+
+    Attributes:
+        seed: The seed.
+        policy: Who acts.
+        most: Steps after which the episode ends.
+        states: Where the random generators are when it acts.
+        reason: Why it can but fail, if that is known.
+        blind: Whether the policy ignores observations, as a plan does; then it draws nothing.
+        to_the_end: Whether it plays all its steps, those after a success or out of time included.
+        takeover: May act in place of the policy: obs → action, or None to let the policy act.
+        corrector: Says at every step what it would do: obs → action.
+        rehearsed: Its episode, if that has happened already, in the rehearsal of its plan; then
+            there is nothing left to play.
+        choices: The choice of each step so far.
+        moments: What each of these steps returned.
+    """
+
+    seed: int
+    policy: Policy
+    most: int
+    states: tuple[Any, ...]
+    reason: str = ""
+    blind: bool = False
+    to_the_end: bool = False
+    takeover: Policy | None = None
+    corrector: Policy | None = None
+    rehearsed: PlayedEpisode | None = None
+    choices: list[Choice] = field(default_factory=list[Choice])
+    moments: list[Moment] = field(default_factory=list[Moment])
+
+    @property
+    def over(self) -> bool:
+        """Whether its episode is over."""
+        if len(self.moments) >= self.most:
+            return True
+        ended = bool(self.moments) and (self.moments[-1].terminated or self.moments[-1].truncated)
+        return ended and not self.to_the_end
+
+    @property
+    def score(self) -> Score:
+        """How its episode went."""
+        if self.rehearsed is not None:
+            return self.rehearsed.score
+        success = bool(self.moments) and self.moments[-1].success
+        total = fsum(moment.reward for moment in self.moments)
+        return Score(success, total, len(self.moments), "" if success else self.reason)
+
+    def episode(self, states: States, drawn: dict[str, Any] | None) -> PlayedEpisode:
+        """Return what happened.
+
+        Args:
+            states: Those of its environment, each entry (T + 1, k).
+            drawn: What was varied in its world.
+
+        Raises:
+            TaskError: If it took no step.
+        """
+        if not self.moments:
+            raise TaskError(self.reason or "an episode needs at least one action")
+        corrections = [c.correction for c in self.choices if c.correction is not None]
+        return PlayedEpisode.of(
+            self.seed,
+            [choice.action for choice in self.choices],
+            states,
+            self.moments,
+            drawn=drawn,
+            actor=np.array([choice.turn for choice in self.choices], np.uint8),
+            corrections=np.stack(corrections) if corrections else None,
+            reason=self.score.reason,
+        )
+
+
+def grouped(seeds: Sequence[int], size: int) -> dict[int, tuple[int, ...]]:
+    """Return which seeds are played at once, by the first of them."""
+    return {seeds[i]: tuple(seeds[i : i + size]) for i in range(0, len(seeds), size)}
+
+
+def one_by_one(event: Event) -> list[Event]:
+    """Return an event for each episode if it is of episodes that were played at once."""
+    if not isinstance(event.result, dict):
+        return [event]
+    return [replace(event, seed=seed, result=result) for seed, result in event.result.items()]
+
+
+def play_together(env: TaskEnv, players: Sequence[Player]) -> None:
+    """Play an episode for each player until all are over; see `steps_together`."""
+    if acting := _acting(players):
+        for _ in steps_together(env, acting):
+            pass
+
+
+def states_together(env: TaskEnv, players: Sequence[Player]) -> list[States]:
+    """Play an episode for each player, as `steps_together` does, and return the states of each.
+
+    Returns:
+        State dicts of `TaskEnv.get_state_dict`, each entry (T + 1, k) for T steps of its
+        player.
+    """
+    played = iter(_played_states(env, _acting(players)))
+    return [next(played) if p.rehearsed is None else p.rehearsed.states for p in players]
+
+
+def record_together(env: TaskEnv, players: Sequence[Player]) -> list[PlayedEpisode]:
+    """Play an episode for each player, as `steps_together` does, and keep what happens.
+
+    Raises:
+        TaskError: Also if a player takes no step.
+    """
+    acting = _acting(players)
+    states = _played_states(env, acting)
+    played = iter([p.episode(states[i], env.drawn(i)) for i, p in enumerate(acting)])
+    return [next(played) if p.rehearsed is None else p.rehearsed for p in players]
+
+
+def _acting(players: Sequence[Player]) -> list[Player]:
+    """Return those whose episodes have not happened yet."""
+    return [player for player in players if player.rehearsed is None]
+
+
+def _played_states(env: TaskEnv, players: Sequence[Player]) -> list[States]:
+    if not players:
+        return []
+    happening = steps_together(env, players)
+    next(happening)
+    tape = env.begin_tape()
+    env.write_tape(tape)
+    for _ in happening:
+        env.write_tape(tape)
+    states = tape.read()
+    return [
+        {
+            kind: {name: rows[: len(player.moments) + 1, i] for name, rows in entries.items()}
+            for kind, entries in states.items()
+        }
+        for i, player in enumerate(players)
+    ]
+
+
+def steps_together(env: TaskEnv, players: Sequence[Player]) -> Generator[None]:
+    """Play an episode for each player, from freshly built worlds, until all are over.
+
+    Every player sees its own environment alone, and draws from generators that are its own, so
+    that nothing depends on who plays beside it. A policy that is marked as `batched` is called
+    once for all of them.
+
+    Args:
+        env: The task, with at least as many environments as players.
+        players: Who plays, one after the other in the environments; what happens is added to
+            them.
+
+    Yields:
+        Nothing: once after the reset, and once after every step.
+
+    Raises:
+        BatchError: If the actions of a batched policy are not one for each environment.
+        ActionError: If an action has the wrong shape or numbers that are not finite.
+    """
+    ids = list(range(len(players)))
+    observation, _ = env.reset([player.seed for player in players], REBUILT, ids)
+    yield
+    reader = ActionReader(env.layout, 1)
+    actions = np.zeros((env.num_envs, env.layout.action_dim), np.float32)
+    env.trust(actions)  # what is written there was checked
+    while running := [i for i in ids if not players[i].over]:
+        choices = _choices(players, running, observation, reader)
+        for i, choice in choices.items():
+            actions[i] = choice.action
+        everywhere = len(running) == env.num_envs
+        began = perf_counter()
+        observation, rewards, terminated, truncated, info = env.step(
+            actions, None if everywhere else running
+        )
+        seconds = (perf_counter() - began) / len(running)
+        columns = (rewards, info["success"], terminated, truncated)
+        rows = list(zip(*(column.tolist() for column in columns), strict=True))
+        for i in running:
+            reward, success, ended, late = rows[i]
+            moment = Moment(None, reward, bool(success), ended, late, seconds)
+            players[i].choices.append(choices[i])
+            players[i].moments.append(moment)
+        yield
+
+
+def is_batched(policy: object) -> bool:
+    """Return whether a policy says that it takes many observations at once, by ``batched``."""
+    return getattr(policy, "batched", False) is True
+
+
+def _choices(
+    players: Sequence[Player], running: Sequence[int], observation: Any, reader: ActionReader
+) -> Mapping[int, Choice]:
+    """Return what is carried out in each environment."""
+    at_once: dict[int, Any] = {}
+    if is_batched(players[0].policy):
+        at_once = _act_at_once(players[0].policy, running, observation)
+    choices: dict[int, Choice] = {}
+    for i in running:
+        player = players[i]
+        if player.blind:
+            choices[i] = Choice(reader.read(player.policy(None))[0].copy())
+        elif at_once and player.takeover is None and player.corrector is None:
+            choices[i] = Choice(reader.read(at_once[i])[0].copy())
+        else:
+            seen = _rows(observation, [i])
+            with _own_generators(player, shared=len(players) > 1):
+                proposed = at_once[i] if at_once else player.policy(seen)
+                choices[i] = _choice(player, proposed, seen, reader)
+    return choices
+
+
+def _choice(player: Player, proposed: Any, seen: Any, reader: ActionReader) -> Choice:
+    choice = Choice(reader.read(proposed)[0].copy())
+    if player.takeover is not None and (instead := player.takeover(seen)) is not None:
+        choice = Choice(_read(instead, reader, "takeover"), 1)
+    if player.corrector is not None:
+        choice = choice._replace(correction=_read(player.corrector(seen), reader, "corrector"))
+    return choice
+
+
+def _read(action: Any, reader: ActionReader, whose: str) -> Row:
+    try:
+        return reader.read(action)[0].copy()
+    except ActionError as error:
+        raise ActionError(f"of the {whose}: {error}") from error
+
+
+@contextmanager
+def _own_generators(player: Player, *, shared: bool) -> Generator[None]:
+    """Let the random generators go on where the player's were, if others draw from them, too."""
+    if not shared:
+        yield
+        return
+    set_random_states(player.states)
+    yield
+    player.states = random_states()
+
+
+def _act_at_once(policy: Policy, running: Sequence[int], observation: Any) -> dict[int, Any]:
+    actions = policy(_rows(observation, running))
+    try:
+        count = len(actions)
+    except TypeError:
+        raise BatchError(
+            f"a batched policy returned {actions!r} for {len(running)} observations; it must"
+            " return an action for each"
+        ) from None
+    if count != len(running):
+        raise BatchError(
+            f"a batched policy returned {count} actions for {len(running)} observations"
+        )
+    return dict(zip(running, actions, strict=True))
+
+
+def _rows(tree: Any, rows: Sequence[int]) -> Any:
+    """Return rows of an observation, in memory of their own, as if there were no others."""
+    if isinstance(tree, dict):
+        return {key: _rows(value, rows) for key, value in tree.items()}
+    return tree[torch.tensor(rows)]

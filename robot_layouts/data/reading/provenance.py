@@ -1,0 +1,291 @@
+"""Where episodes come from, as plain data that can be compared and that their recording keeps.
+
+What an episode depends on besides its seed and actions, who acted, and its checksum. The recorder
+writes it, the reader reads it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import NotRequired, TypedDict
+
+from layouts import Layout
+from robot_layouts.core.files import parse_json
+from robot_layouts.core.schema import (
+    AnyText,
+    FieldError,
+    Finite,
+    Name,
+    Object,
+    check,
+    length,
+    whole,
+)
+from robot_layouts.data.reading.guessed_robots import describe_guessed
+from robot_layouts.data.reading.manifest import FILE_NUMBER
+from robots import CONTROL_MODES, JointGroup
+from robots.control_modes import plain_mode
+from robots.fingerprint import asset_fingerprint
+from tasks import TaskEnv
+from tasks.native.format import observation_keys
+from tasks.registry import full_name
+
+_ACTION_NUMBERS = 10_000  # of all robots
+
+
+# What `describe_layout` and `describe_simulation` write, as far as it is read again.
+class _Place(TypedDict):
+    robot: Name
+    position: Annotated[list[Finite], length(3)]
+    quaternion: Annotated[list[Finite], length(4)]
+    keyframe: Name | None
+    qpos_noise: Finite | None
+    action: Annotated[list[Annotated[int, whole(0, _ACTION_NUMBERS)]], length(2)]
+    start_qpos: NotRequired[list[Finite]]
+    joint_groups: NotRequired[Object]
+    assets: NotRequired[AnyText]
+
+
+class _Simulation(TypedDict, total=False):
+    physics: Object | None
+    control_frequency: Finite
+    randomization: Object
+
+
+LAYOUT = dict[str, _Place] | None
+SIMULATION = _Simulation | None
+
+# What an episode consists of, in its group of an h5 file.
+CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
+STATES = "env_states/"
+ARRAYS = (
+    "actions",
+    STATES.rstrip("/"),
+    "rewards",
+    "success",
+    "terminated",
+    "truncated",
+    "actor",
+    "corrections",
+)
+TEXTS = ("action_split", "episode")
+
+# What may change from one resumption to the next, and what earlier versions did not write.
+NOT_COMPARED = ("source_type", "source_desc", "guessed", FILE_NUMBER)
+
+_SHOWN = 4  # differences that a message names
+_ABSENT = "nothing"
+
+
+def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
+    """Return everything about a layout's robots that physics depends on, by robot name.
+
+    Each has ``robot``, base ``position`` (m) and ``quaternion`` (wxyz), ``keyframe``,
+    ``start_qpos`` (rad, m), ``qpos_noise`` (rad), ``action`` (its first and last + 1 action
+    number), ``joint_groups`` (see `robots.JointGroup`), and ``assets``, a SHA-256 over its files.
+    Everything can be written as json; the order is that of the action numbers.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+    """
+    split = layout.robot_actions
+    return {
+        name: {
+            "robot": placement.robot.name,
+            "position": list(placement.base_position),
+            "quaternion": list(placement.base_quaternion),
+            "keyframe": placement.start_keyframe,
+            "start_qpos": list(placement.start_qpos),
+            "qpos_noise": placement.qpos_noise,
+            "action": [split[name].start, split[name].stop],
+            "joint_groups": {
+                group: _describe_group(joints)
+                for group, joints in placement.robot.action_split.groups.items()
+            },
+            "assets": asset_fingerprint(placement.robot.urdf),
+        }
+        for name, placement in layout.items()
+    }
+
+
+def _describe_group(group: JointGroup) -> dict[str, Any]:
+    """Return a joint group's fields; those that recordings of old lack only where they count."""
+    silent = set[str]() if group.asks.tcp else {"frame", "root_link"}
+    silent |= set() if any(group.armatures) else {"armature"}
+    silent |= {"command"} if group.command == "position" else set()
+    silent |= set() if group.target else {"target"}
+    silent |= set() if group.leaders else {"leaders", "lead"}
+    return {name: value for name, value in asdict(group).items() if name not in silent}
+
+
+def describe_simulation(task: TaskEnv) -> dict[str, Any]:
+    """Return a task's physics settings (None: SAPIEN's own) and control frequency (Hz).
+
+    And what varies in its worlds, if anything does.
+    """
+    physics, randomization = task.scenario.physics, task.scenario.randomization
+    return {
+        "physics": None if physics is None else asdict(physics),
+        "control_frequency": task.scenario.control_frequency,
+        **({"randomization": randomization.to_json()} if randomization else {}),
+    }
+
+
+def read_described(texts: Mapping[str, str], name: str, kind: Any) -> Any:
+    """Return what is written as json in one of several attributes; None if it is not there.
+
+    Raises:
+        ValueError: If it is not json, or of another kind.
+    """
+    if name not in texts:
+        return None
+    try:
+        described = parse_json(texts[name])
+    except ValueError as error:
+        raise FieldError(f"attribute {name}: {error}") from error
+    check(described, kind, name)
+    return described
+
+
+def action_split(described: Mapping[str, Mapping[str, Any]]) -> dict[str, slice]:
+    """Return robot name → slice of the flat action, of a layout that was described.
+
+    Raises:
+        FieldError: If the slices do not follow one another.
+    """
+    split = {name: slice(*robot["action"]) for name, robot in described.items()}
+    stop = 0
+    for name, numbers in split.items():
+        if numbers.start != stop or numbers.stop < stop:
+            raise FieldError(
+                f"layout.{name}.action is {[numbers.start, numbers.stop]}; it must begin at {stop},"
+                " after the robots before it"
+            )
+        stop = numbers.stop
+    return split
+
+
+def differences(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+    """Return one phrase per field in which two descriptions differ; floats must be equal.
+
+    Args:
+        recorded: A description that was read from a file.
+        here: The same of a task that was made.
+    """
+    before, now = (dict(_fields(json.loads(json.dumps(about)))) for about in (recorded, here))
+    return [
+        f"{field}: recorded {before.get(field, _ABSENT)}, here {now.get(field, _ABSENT)}"
+        for field in dict.fromkeys([*before, *now])
+        if before.get(field, _ABSENT) != now.get(field, _ABSENT)
+    ]
+
+
+def listing(found: list[str]) -> str:
+    """Return differences as the end of a sentence, the first few of them."""
+    more = f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+    return "; ".join(found[:_SHOWN]) + more
+
+
+def _fields(about: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for name, value in about.items():
+        if isinstance(value, dict):
+            yield from _fields(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", json.dumps(value)
+
+
+def checksum(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the checksum of an episode, whatever file it is in and in whatever order.
+
+    It covers `TEXTS` and `ARRAYS`; what others may have added is left out.
+    """
+    names = sorted(name for name in arrays if name.partition("/")[0] in ARRAYS)
+    about = [
+        [(name, attributes.get(name)) for name in TEXTS],
+        [(name, arrays[name].dtype.str, arrays[name].shape) for name in names],
+    ]
+    found = zlib.crc32(json.dumps(about).encode())
+    for name in names:
+        found = zlib.crc32(np.ascontiguousarray(arrays[name]).data, found)
+    return f"crc32 {found:08x}"
+
+
+def describe_task(task: TaskEnv, source: str, source_desc: str | None) -> dict[str, Any]:
+    """Return what every file of a recording says about all its episodes.
+
+    Args:
+        task: The task.
+        source: Where the actions come from, in ManiSkill's words.
+        source_desc: The same in one's own words.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+    """
+    name, guessed = full_name(task.task_class), describe_guessed(task.scenario.layout)
+    return {
+        "env_info": {
+            "env_id": task.task_id,
+            **({"module": name.rpartition(":")[0]} if ":" in name else {}),
+            "env_kwargs": {
+                "obs_mode": "none",
+                "reward_mode": task.reward_mode,
+                "control_mode": plain_mode(task.control_mode),
+                "sim_backend": "physx_cpu",
+            },
+            "max_episode_steps": task.max_episode_steps,
+        },
+        "source_type": source,
+        "source_desc": source_desc,
+        "layout": describe_layout(task.layout),
+        "simulation": describe_simulation(task),
+        **({"guessed": guessed} if guessed else {}),
+    }
+
+
+def numbered(header: Mapping[str, Any], number: int) -> dict[str, Any]:
+    """Return the header of one of a recording's files; the first is not numbered."""
+    return {**header, **({FILE_NUMBER: number} if number else {})}
+
+
+def header_differences(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+    """Return one phrase per field in which two headers differ, as far as it matters."""
+    return differences(_compared(recorded), _compared(here))
+
+
+def header_hash(header: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of what must not differ."""
+    text = json.dumps(_compared(header), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _compared(header: Mapping[str, Any]) -> dict[str, Any]:
+    about = {name: value for name, value in header.items() if name not in NOT_COMPARED}
+    if isinstance(info := about.get("env_info"), dict):
+        about["env_info"] = {name: value for name, value in info.items() if name != "module"}
+    return about
+
+
+def recorded_control_mode(task: TaskEnv) -> str | dict[str, str]:
+    """Return the control mode as native writes it: by robot where there are several.
+
+    Where the arms of a robot have modes of their own, it is the mode by arm.
+    """
+    mode, keys = task.control_mode, observation_keys(task.layout)
+    if isinstance(mode, str):
+        return mode if None in keys.values() else {str(key): mode for key in keys.values()}
+    modes = {task.layout.arm_name(arm): own for arm, own in mode.items()}
+    by_arm = {
+        arm: modes.get(arm, modes.get(task.layout.owner(arm), CONTROL_MODES[0]))
+        for arm in task.layout.arms
+    }
+    if None in keys.values() or set(by_arm) != set(task.layout):
+        return by_arm
+    return {str(keys[robot]): own for robot, own in by_arm.items()}

@@ -1,0 +1,200 @@
+"""Makes the task and the layout of what a recording or a receipt says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from layouts import Layout, Placement
+from layouts.placement import RobotLike
+from robot_layouts.data.reading.guessed_robots import guess_again
+from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.reading.summary import TrajectoryError
+from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
+from tasks import MultiRobotTask, TaskEnv, get_task_class, make
+from tasks.language.needs import ACT, HOLD
+from tasks.native.format import mode_by_arm
+from tasks.varying.randomization import Randomization
+
+MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
+
+
+def task_class(file: Recording, task_id: str | None = None) -> type[MultiRobotTask]:
+    """Return the class of the task that a file was recorded in.
+
+    Args:
+        file: The recording.
+        task_id: Which task it must be; ``module:Id`` imports a module of the user's own, which a
+            recording does not do by itself: it must not choose which code runs.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+        TrajectoryError: If it is of another task, or its module has to be named.
+    """
+    wanted = None if task_id is None else get_task_class(task_id)
+    try:
+        recorded = get_task_class(file.task_id)
+    except UnknownNameError as error:
+        if file.module is None or wanted is not None:
+            raise
+        raise TrajectoryError(
+            f"{file.path} was recorded in {file.task_id} of the module {file.module}, which no"
+            " installed package lists, and a recording does not choose which code runs; name it:"
+            f" --task {file.module}:{file.task_id}, or import the module"
+        ) from error
+    if wanted is not None and recorded is not wanted:
+        raise TrajectoryError(
+            f"{file.path} was recorded in {file.task_id}, not in {wanted.task_id}"
+        )
+    return recorded
+
+
+def task_for(
+    file: Recording,
+    *,
+    layout: Layout | None = None,
+    robots: RobotLike | Mapping[str, RobotLike] | None = None,
+    bystanders: str | None = None,
+    pictures: bool = False,
+) -> TaskEnv:
+    """Make the task that a file was recorded in, with its robots where they stood.
+
+    Args:
+        file: The recording.
+        layout: Where they stood, where the file cannot say it; the same is needed.
+        robots: Which robots these were, where the file cannot say it; the same are needed.
+        bystanders: What those without a place did, where the file cannot say it.
+        pictures: Whether to draw its worlds.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+        TrajectoryError: If the file's layout, robot files, physics or actions are not those of
+            the task that can be made here.
+        TaskError: If the task cannot be made like that.
+        AssetError: If robot files cannot be found.
+    """
+    cls = task_class(file)
+    making: dict[str, Any] = {"layout": layout, "robots": robots, "bystanders": bystanders}
+    if layout is None and file.layout is not None:
+        named = robots if isinstance(robots, Mapping) else dict.fromkeys(file.layout, robots)
+        making |= _recorded(file, cls, {n: r for n, r in named.items() if r is not None})
+    if "control_frequency" in (file.simulation or {}):
+        making["control_frequency"] = file.simulation["control_frequency"]
+    making["randomization"] = _varied(file)
+    task = make(
+        file.task_id,
+        obs_mode="none",
+        control_mode=mode_by_arm(file.control_mode, making["layout"] or cls.layout),
+        render_mode="rgb_array" if pictures else None,
+        **making,
+    )
+    file.expect(task.task_id, task.layout.action_dim)
+    file.expect_world(task)
+    return task
+
+
+def _varied(file: Recording) -> Randomization | None:
+    """Return what varied in the worlds of a recording."""
+    described = (file.simulation or {}).get("randomization")
+    try:
+        return None if described is None else Randomization.from_json(described)
+    except RobotLayoutsError as error:
+        raise TrajectoryError(
+            f"{file.path} has a randomization that makes no sense here: {error}"
+        ) from error
+
+
+def _recorded(
+    file: Recording, cls: type[MultiRobotTask], robots: Mapping[str, RobotLike]
+) -> dict[str, Any]:
+    """Return the layout of a recording as arguments of `tasks.make`, none if it is the task's."""
+    layout = layout_again(file.layout or {}, file.guessed or {}, cls.layout, robots, file.path)
+    if same_places(layout, cls.layout):
+        return {"robots": None}
+    extra = cls.robot_counts is None and set(layout.places) - set(cls.layout.places)
+    bystanders = (HOLD if _holds(file, layout) else ACT) if extra else None
+    return {"layout": layout, "robots": None, "bystanders": bystanders, "check_layout": False}
+
+
+def _holds(file: Recording, layout: Layout) -> bool:
+    """Return whether robots or limbs of a recording took fewer numbers than they can."""
+    acting = layout.in_control_mode(mode_by_arm(file.control_mode, layout)).robot_actions
+    recorded = {place: about["action"] for place, about in (file.layout or {}).items()}
+    return any(
+        last - first < acting[place].stop - acting[place].start
+        for place, (first, last) in recorded.items()
+    )
+
+
+def layout_again(
+    described: Mapping[str, Mapping[str, Any]],
+    guessed: Mapping[str, Mapping[str, str]],
+    own: Layout,
+    robots: Mapping[str, RobotLike],
+    source: object,
+) -> Layout:
+    """Return a layout that `robot_layouts.data.reading.provenance.describe_layout` described.
+
+    Args:
+        described: The description; ``control_mode`` of a place counts where it is there.
+        guessed: Robots that were guessed from a URDF or MJCF; see `guess_again`.
+        own: The layout that the task declares: its robots are taken where their names fit.
+        robots: Which robots to take, by place, where the description cannot say it.
+        source: The file, for errors.
+
+    Raises:
+        UnknownNameError: If a robot is given for a place that there is not.
+        TrajectoryError: If a robot cannot be had here, or it is no layout.
+    """
+    for place in robots:
+        if place not in described:
+            raise UnknownNameError("place", place, described)
+    if len(described) > MOST_ROBOTS:
+        raise TrajectoryError(
+            f"{source} has a layout of {len(described)} robots; {MOST_ROBOTS} are the most that"
+            " are built for a recording"
+        )
+    placements: dict[str, Placement] = {}
+    for place, about in described.items():
+        try:
+            if place in robots:
+                robot: RobotLike = robots[place]
+            elif place in guessed:
+                robot = guess_again(place, guessed[place], about["robot"])
+            elif place in own and own[place].robot.name == about["robot"]:
+                robot = own[place].robot
+            else:
+                robot = RobotRegistry.load(about["robot"])
+            placements[place] = Placement(
+                robot,
+                tuple(about["position"]),  # pyright: ignore[reportArgumentType]
+                tuple(about["quaternion"]),  # pyright: ignore[reportArgumentType]
+                about["keyframe"],
+                about["qpos_noise"],
+                control_mode=about.get("control_mode"),
+            )
+        except TrajectoryError:
+            raise
+        except RobotLayoutsError as error:
+            raise TrajectoryError(
+                f"{source} has a robot at {place!r} that cannot be had here:"
+                f" {str(error).rstrip('.')}; name the robot, with --robots {place}=… or"
+                f" robots={{{place!r}: …}}"
+            ) from error
+    try:
+        return Layout(placements)
+    except LayoutError as error:
+        raise TrajectoryError(f"{source} has no layout that can be used: {error}") from error
+
+
+def same_places(first: Layout, second: Layout) -> bool:
+    """Return whether two layouts put the same robots at the same places of the world."""
+    return [_outline(*item) for item in first.items()] == [
+        _outline(*item) for item in second.items()
+    ]
+
+
+def _outline(place: str, placement: Placement) -> tuple[Any, ...]:
+    pose = placement.base_pose
+    start = placement.start_keyframe, placement.qpos_noise
+    return place, placement.robot, pose.position, pose.quaternion, *start

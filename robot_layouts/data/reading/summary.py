@@ -1,0 +1,253 @@
+"""The json beside an h5 file of episodes, as ManiSkill writes it and as we do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from typing_extensions import NotRequired, TypedDict
+
+from robot_layouts.core.files import read_json
+from robot_layouts.core.schema import AnyText, FieldError, Finite, Name, Object, check, whole
+from robots import CONTROL_MODES, RobotLayoutsError, UnreadableFileError
+
+MAX_JSON = 2**28  # bytes; some 600,000 episodes
+MAX_STEPS = 10**6  # of an episode; fourteen hours at 20 Hz
+MAX_SEED = 2**32 - 1  # of NumPy's generators
+
+_Seed = Annotated[int, whole(0, MAX_SEED)]
+_Seeds = _Seed | list[_Seed] | None
+_Steps = Annotated[int, whole(1, MAX_STEPS)]
+_Mode = Name | dict[str, Name]
+
+
+class _Reset(TypedDict, total=False):
+    seed: _Seeds
+    options: Object | None
+
+
+class _Actor(TypedDict):
+    kind: Name
+    name: AnyText
+    sha256: NotRequired[AnyText | None]
+
+
+class _Source(TypedDict):
+    kind: Name
+    actors: NotRequired[list[_Actor]]
+    corrects: NotRequired[_Actor]
+
+
+class _Played(TypedDict, total=False):
+    control_mode: _Mode | None
+    reset_kwargs: _Reset | None
+    success: bool | Finite | None
+    source: _Source | None
+    drawn: Object | None
+    reason: AnyText | None
+
+
+class OwnEpisode(_Played):
+    """An episode's own note in a recording of this library, which becomes its entry in the json."""
+
+    episode_seed: _Seed
+    elapsed_steps: _Steps
+
+
+class _Episode(_Played):
+    episode_id: Annotated[int, whole(0, 2**31 - 1)]
+    episode_seed: NotRequired[_Seeds]
+    elapsed_steps: NotRequired[_Steps | None]
+
+
+class _EnvKwargs(TypedDict, total=False):
+    control_mode: _Mode | None
+    sim_backend: Name | None
+
+
+class _EnvInfo(TypedDict):
+    env_id: Name
+    env_kwargs: NotRequired[_EnvKwargs | None]
+    max_episode_steps: NotRequired[_Steps | None]
+    module: NotRequired[Name | None]
+
+
+class _Summary(TypedDict):
+    env_info: _EnvInfo
+    episodes: list[_Episode]
+    source_type: NotRequired[AnyText | None]
+    source_desc: NotRequired[AnyText | None]
+
+
+class TrajectoryError(RobotLayoutsError, ValueError):
+    """A file of recorded episodes that cannot be read, or is for something else."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What the json says about an episode.
+
+    Attributes:
+        episode_id: Its number in the file.
+        seed: Seed of its reset; None if there is none, or several.
+        episode_seed: The same as the recording's own note of it, which may be absent.
+        steps: Its control steps, or None.
+        rebuilt: Whether its reset rebuilt the world.
+        success: Whether it ended in success, or None.
+        source: Who acted; see `tasks.episode.PlayedEpisode`.
+        drawn: What was varied in its world; likewise.
+        reason: Why it failed, in words; likewise.
+    """
+
+    episode_id: int
+    seed: int | None
+    episode_seed: int | None
+    steps: int | None
+    rebuilt: bool
+    success: bool | None = None
+    source: dict[str, Any] | None = None
+    drawn: dict[str, Any] | None = None
+    reason: str = ""
+
+    @property
+    def group(self) -> str:
+        """The name of its group in the h5 file."""
+        return f"traj_{self.episode_id}"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What the json says about a recording.
+
+    Attributes:
+        task_id: Id of the task that was recorded.
+        module: Module of a user's own that registers it, or None.
+        env_kwargs: What native's environment was made with.
+        control_mode: Control mode of every episode, or those of arms: by their names in the
+            layout, or by native's of robots.
+        max_episode_steps: Control steps until an episode was truncated, or None.
+        source_type: Where the actions come from, in ManiSkill's words, or None.
+        source_desc: The same in the recorder's own words, or None.
+        episodes: Its episodes, in order.
+    """
+
+    task_id: str
+    module: str | None
+    env_kwargs: dict[str, Any]
+    control_mode: str | dict[str, str]
+    max_episode_steps: int | None
+    source_type: str | None
+    source_desc: str | None
+    episodes: tuple[Entry, ...]
+
+
+def read_summary(path: Path) -> Summary:
+    """Return what the json beside an h5 file says.
+
+    Raises:
+        TrajectoryError: If it cannot be read, is of another kind, or names no control mode in
+            which all episodes can be played.
+    """
+    found = _read(path)
+    info, episodes = found["env_info"], found["episodes"]
+    env_kwargs = info.get("env_kwargs") or {}
+    return Summary(
+        task_id=info["env_id"],
+        module=info.get("module"),
+        env_kwargs=env_kwargs,
+        control_mode=_common_mode(
+            path, episodes, env_kwargs.get("control_mode"), own="layout" in found
+        ),
+        max_episode_steps=info.get("max_episode_steps"),
+        source_type=found.get("source_type"),
+        source_desc=found.get("source_desc"),
+        episodes=tuple(_entry(episode) for episode in episodes),
+    )
+
+
+def recorded_task(path: Path) -> str:
+    """Return the id of the task that a file was recorded in, from the json beside it.
+
+    Raises:
+        TrajectoryError: If the json cannot be read.
+    """
+    return _read(path)["env_info"]["env_id"]
+
+
+def _read(path: Path) -> dict[str, Any]:
+    beside = path.with_suffix(".json")
+    try:
+        found = read_json(beside, MAX_JSON)
+    except UnreadableFileError as error:
+        if error.errno is None:
+            raise TrajectoryError(
+                f"{beside} is not a demonstration's json: {error.strerror}"
+            ) from error
+        raise TrajectoryError(
+            f"cannot read {beside}, which belongs beside {path.name}: {error.strerror}"
+        ) from error
+    try:
+        check(found, _Summary, "")
+    except FieldError as error:
+        raise TrajectoryError(f"{beside} is not a demonstration's json: {error}") from error
+    listed = [episode["episode_id"] for episode in found["episodes"]]
+    if len(set(listed)) != len(listed):
+        raise TrajectoryError(f"{beside} lists an episode twice")
+    return found
+
+
+def _entry(episode: Mapping[str, Any]) -> Entry:
+    reset: Mapping[str, Any] = episode.get("reset_kwargs") or {}
+    options: Mapping[str, Any] = reset.get("options") or {}
+    return Entry(
+        episode_id=episode["episode_id"],
+        seed=_only(reset.get("seed")),
+        episode_seed=_only(episode.get("episode_seed")),
+        steps=episode.get("elapsed_steps"),
+        rebuilt=bool(options.get("reconfigure")),
+        success=None if episode.get("success") is None else bool(episode["success"]),
+        source=episode.get("source"),
+        drawn=episode.get("drawn"),
+        reason=episode.get("reason") or "",
+    )
+
+
+def _only(seed: int | list[int] | None) -> int | None:
+    """Return a seed, which native writes as a list where environments are vectors."""
+    if isinstance(seed, list):
+        return seed[0] if len(seed) == 1 else None
+    return seed
+
+
+def _common_mode(
+    path: Path, episodes: list[Mapping[str, Any]], default: Any, *, own: bool
+) -> str | dict[str, str]:
+    """Return the control mode of all episodes.
+
+    Args:
+        path: The recording.
+        episodes: Their json.
+        default: What the environment was made with.
+        own: Whether this library recorded it, perhaps in a mode of a robot's own.
+    """
+    given = [episode.get("control_mode", default) for episode in episodes] or [default]
+    mixed = default if isinstance(default, Mapping) else given[0]
+    modes = sorted({mode for each in given for mode in _modes(each)} or _modes(default))
+    if modes and (own or set(modes) <= set(CONTROL_MODES)):
+        if len(modes) == 1 and not isinstance(default, Mapping):
+            return modes[0]
+        if isinstance(mixed, Mapping) and all(each == given[0] for each in given):
+            return dict(mixed)
+    listing = " and ".join(modes[:4]) or "no control mode that it names"
+    raise TrajectoryError(
+        f"{path} was recorded in {listing}; an episode can be played in one of"
+        f" {', '.join(CONTROL_MODES)}, or each arm in one of its own"
+    )
+
+
+def _modes(mode: str | Mapping[str, str] | None) -> set[str]:
+    if mode is None:
+        return set()
+    return {mode} if isinstance(mode, str) else set(mode.values())

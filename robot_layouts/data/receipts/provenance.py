@@ -1,0 +1,212 @@
+"""What an evaluation depends on: task and policy with their code and files, and the machine."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from robot_layouts.core.rooms import PACKAGES
+from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore
+from robot_layouts.data.playing.together import is_batched
+from robot_layouts.data.reading.guessed_robots import describe_guessed
+from robot_layouts.data.receipts.making import describe_making
+from robot_layouts.data.receipts.receipt import EpisodeReceipt, Receipt, ReceiptError
+from robot_layouts.data.sources.actors import checksum, definition, name_of
+from robot_layouts.experts.registry import Expert
+from robots import UnreadableFileError
+from tasks import MultiRobotTask
+from tasks.episode import Score
+
+EXPERT, POLICY = "expert", "policy"
+_MAIN = "__main__"  # a script or a notebook, which cannot be imported
+_VARIABLE = re.compile(r"""\b(?:environ(?:\.get\(|\[)|getenv\()\s*["'](\w+)["']""")
+
+
+def describe_job(job: EvaluationJob, name: str | None = None) -> dict[str, Any]:
+    """Return the parts of a receipt that describe what is played: ``task``, ``policy``, ``making``.
+
+    Args:
+        job: What is played.
+        name: Where its policy was imported from, ``module:name``; None: it is looked for.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+        ReceiptError: If a file of the policy cannot be read.
+    """
+    cast = job.cast
+    at_once = job.scenario.num_envs if is_batched(cast.policy) else None
+    expert = cast.expert
+    return {
+        "task": describe_task(job.task),
+        "policy": describe_policy(cast.policy, name) if expert is None else describe_expert(expert),
+        "making": describe_making(job.task, job.scenario, at_once),
+    }
+
+
+def receipt_of(
+    described: Mapping[str, Any], job: EvaluationJob, scores: Mapping[int, Score]
+) -> Receipt:
+    """Return the receipt of episodes that were played.
+
+    Its environment is that of the first episode; in ``others`` are those that differ from it.
+
+    Args:
+        described: What `describe_job` returned before they were.
+        job: What was played.
+        scores: Seed → how it went, each a `TracedScore`.
+    """
+    traced = {seed: score for seed, score in scores.items() if isinstance(score, TracedScore)}
+    different: list[Mapping[str, Any]] = []
+    for score in traced.values():
+        if score.environment not in different:
+            different.append(score.environment)
+    first, *others = different
+    more = {
+        "others": others,
+        "guessed": describe_guessed(job.scenario.layout),
+        "variables": variables_read(job.cast.policy, described["policy"]["name"]),
+    }
+    return Receipt(
+        **described,
+        environment={**first, **{name: value for name, value in more.items() if value}},
+        episodes=tuple(
+            EpisodeReceipt(
+                seed, s.success, s.steps, s.total, s.trace.states, s.trace.trace, s.reason
+            )
+            for seed, s in traced.items()
+        ),
+    )
+
+
+def describe_task(cls: type[MultiRobotTask]) -> dict[str, Any]:
+    """Return which task this is.
+
+    It has ``id``, ``class`` (``module:Class``), ``sha256`` of that module's file, and in ``also``,
+    by name, those of modules outside this library that define classes that it inherits from.
+    """
+    bases = {base.__module__ for base in cls.__mro__[1:-1]} - {cls.__module__}
+    outside = sorted(name for name in bases if name.partition(".")[0] not in PACKAGES)
+    return {
+        "id": cls.task_id,
+        "class": f"{cls.__module__}:{cls.__qualname__}",
+        "sha256": _module_checksum(cls.__module__),
+        **_filled(also={name: _module_checksum(name) for name in outside}),
+    }
+
+
+def describe_expert(expert: Expert) -> dict[str, Any]:
+    """Return which expert this is; see `describe_policy`."""
+    module = definition(expert).__module__
+    return {"kind": EXPERT, "name": name_of(expert), "sha256": _module_checksum(module)}
+
+
+def describe_policy(policy: Any, name: str | None = None) -> dict[str, Any]:
+    """Return who this policy is.
+
+    It has ``kind``, ``name`` (``module:name``), whether that is ``importable``, and ``sha256`` of
+    the file of that module. In ``also`` is that of the module that defines its class, if that is
+    another one; in ``files`` those of the files that it names by its attribute ``file`` or
+    ``files``; in ``weights`` one over the tensors of each ``torch.nn.Module`` that it is or has.
+
+    Args:
+        policy: What gives actions.
+        name: Where it was imported from, ``module:name``; None: it is looked for.
+
+    Raises:
+        ReceiptError: If one of its files cannot be read.
+    """
+    found = name or _importable_name(policy)
+    module, defining = (found or name_of(policy)).partition(":")[0], definition(policy).__module__
+    return {
+        "kind": POLICY,
+        "name": found or name_of(policy),
+        "importable": found is not None,
+        "sha256": _module_checksum(module),
+        **_filled(
+            also={} if defining == module else {defining: _module_checksum(defining)},
+            files=_files(policy),
+            weights=_weights(policy),
+        ),
+    }
+
+
+def variables_read(policy: Any, name: str) -> str:
+    """Return the environment variables that are set and that the source of a policy reads by name.
+
+    Their values are left out: they may be secret.
+
+    Args:
+        policy: What gives actions.
+        name: Where it was imported from, ``module:name``.
+    """
+    found = set[str]()
+    for module in {name.partition(":")[0], definition(policy).__module__}:
+        if file := getattr(sys.modules.get(module), "__file__", None):
+            with suppress(OSError):
+                found.update(_VARIABLE.findall(Path(file).read_text(errors="replace")))
+    return " ".join(sorted(found & {*os.environ}))
+
+
+def _importable_name(policy: Any) -> str | None:
+    """Return ``module:name`` by which another process finds this very thing, if there is one."""
+    module = definition(policy).__module__
+    if module == _MAIN or module not in sys.modules:
+        return None
+    names = vars(sys.modules[module])
+    found = next((name for name, value in names.items() if value is policy), None)
+    return None if found is None else f"{module}:{found}"
+
+
+def _filled(**parts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those parts that hold something."""
+    return {name: part for name, part in parts.items() if part}
+
+
+def _module_checksum(name: str) -> str | None:
+    """Return the SHA-256 of a module that is imported; None of one without a file of its own."""
+    file = getattr(sys.modules.get(name), "__file__", None)
+    try:
+        return None if file is None else checksum(file)
+    except UnreadableFileError:  # inside an archive
+        return None
+
+
+def _files(policy: Any) -> dict[str, str]:
+    """Return the SHA-256 of each file that a policy names, by its path below their folder."""
+    one, several = getattr(policy, "file", None), getattr(policy, "files", None) or ()
+    try:
+        paths = [Path(path).absolute() for path in [*([] if one is None else [one]), *several]]
+        folder = os.path.commonpath([path.parent for path in paths]) if paths else ""
+        return {path.relative_to(folder).as_posix(): checksum(path) for path in paths}
+    except (TypeError, ValueError, UnreadableFileError) as error:
+        raise ReceiptError(
+            f"the policy {name_of(policy)} names files that cannot be read: {error}; its attribute"
+            " files must be a list of paths, and file one"
+        ) from error
+
+
+def _weights(policy: Any) -> dict[str, str]:
+    """Return one SHA-256 over all tensors of a network, or of each that a policy has."""
+    if isinstance(policy, torch.nn.Module):
+        return {"self": _tensors(policy)}
+    kept: dict[str, Any] = getattr(policy, "__dict__", {})
+    networks = {name: own for name, own in kept.items() if isinstance(own, torch.nn.Module)}
+    return {name: _tensors(network) for name, network in sorted(networks.items())}
+
+
+def _tensors(network: torch.nn.Module) -> str:
+    digest = sha256()
+    for name, tensor in sorted(network.state_dict().items()):
+        if not isinstance(tensor, torch.Tensor):  # what a network of the user's own adds
+            continue
+        digest.update(f"{name} {tensor.dtype} {tuple(tensor.shape)}\n".encode())
+        digest.update(tensor.detach().cpu().reshape(-1).view(torch.uint8).numpy().tobytes())
+    return digest.hexdigest()

@@ -1,0 +1,239 @@
+"""A receipt: who played which task, made how, on what machine, and a digest of every state."""
+
+from __future__ import annotations
+
+import json
+from base64 import b64decode
+from binascii import Error as NotBase64
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from hashlib import sha256
+from os import PathLike
+from statistics import mean
+from typing import Annotated, Any
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+from typing_extensions import NotRequired, TypedDict
+
+from robot_layouts.core.files import read_json
+from robot_layouts.core.schema import (
+    AnyText,
+    Digest,
+    FieldError,
+    Finite,
+    Name,
+    Object,
+    check,
+    exactly,
+    whole,
+)
+from robot_layouts.core.writing import write_whole
+from robot_layouts.data.playing.state_trace import BYTES
+from robot_layouts.data.reading.summary import MAX_SEED, MAX_STEPS
+from robots import RobotLayoutsError, UnreadableFileError
+
+FORMAT = "robot-layouts receipt 1"
+MAX_BYTES = 2**27  # of a file; 100,000 episodes of 200 steps take a half
+
+# A module before a task's id would be imported.
+_Id = Annotated[str, Meta(pattern="^[^:]{1,200}\\Z", description="a task's id, without a module")]
+_Task = TypedDict("_Task", {"id": _Id, "class": Name, "sha256": Digest | None})
+
+
+class _Policy(TypedDict):
+    kind: Name
+    name: Name
+    sha256: Digest | None
+    files: NotRequired[Object]
+
+
+class _Making(TypedDict):
+    layout: Object
+
+
+class _Environment(TypedDict):
+    versions: Object
+    processor: Object
+    variables: NotRequired[AnyText]
+
+
+class _Episode(TypedDict):
+    seed: Annotated[int, whole(0, MAX_SEED)]
+    success: bool
+    steps: Annotated[int, whole(0, MAX_STEPS)]
+    total: Finite
+    states: Digest
+    trace: AnyText
+    reason: NotRequired[AnyText]
+
+
+class _Receipt(TypedDict):
+    format: Annotated[str, exactly(FORMAT)]
+    hash: Digest
+    task: _Task
+    policy: _Policy
+    making: _Making
+    environment: _Environment
+    episodes: list[_Episode]
+
+
+class ReceiptError(RobotLayoutsError, ValueError):
+    """A receipt that cannot be read, or whose episodes cannot be played again here."""
+
+
+@dataclass(frozen=True)
+class EpisodeReceipt:
+    """How one episode went.
+
+    Attributes:
+        seed: Its seed.
+        success: Whether its last step was a success.
+        steps: Its control steps.
+        total: The sum of its rewards, its return.
+        states: SHA-256, in hex, over all states: after the reset and after each step.
+        trace: The first two bytes of that digest as it stood at each of these moments, in base64.
+        reason: Why it failed, in words, if that is known; of an expert, it is.
+    """
+
+    seed: int
+    success: bool
+    steps: int
+    total: float
+    states: str
+    trace: str
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse values that no episode has.
+
+        Raises:
+            ReceiptError: If a value is of another kind, or the trace has another length.
+        """
+        about = f"the episode of seed {self.seed!r}"
+        vars(self).update(check(asdict(self), _Episode, about, ReceiptError))
+        try:
+            length = len(b64decode(self.trace, validate=True))
+        except (NotBase64, ValueError):
+            length = -1
+        if length != BYTES * (self.steps + 1):
+            raise ReceiptError(
+                f"the episode of seed {self.seed}: its trace must be {BYTES * (self.steps + 1)}"
+                f" bytes in base64, {BYTES} for the reset and for each of {self.steps} steps"
+            )
+
+    def digests(self) -> NDArray[np.uint8]:
+        """Return the first bytes of the digest after the reset and each step, (steps + 1, 2)."""
+        return np.frombuffer(b64decode(self.trace), np.uint8).reshape(-1, BYTES)
+
+
+@dataclass(frozen=True)
+class Receipt:
+    """What was evaluated, and the results.
+
+    Attributes:
+        task: ``id``, ``class`` (``module:Class``) and ``sha256`` of the module's source.
+            See `robot_layouts.data.receipts.provenance.describe_task`.
+        policy: ``kind`` (``expert`` or ``policy``), ``name`` (``module:name``), ``sha256`` of its
+            module's source, and more; see `robot_layouts.data.receipts.provenance.describe_policy`.
+        making: What the task was made with: its ``layout`` with the checksums of robot files, and
+            more; see `robot_layouts.data.receipts.making.describe_making`.
+        environment: ``versions`` and ``processor`` of where it was played; see
+            `environment`. ``others``, if workers differed; ``guessed``, where the
+            files of robots were that no registry knows; ``variables``, names of environment
+            variables that the policy's source reads and that were set.
+        episodes: One for each seed, in the order in which these were given.
+        claimed: The hash that a file says it has; empty if it comes from no file.
+    """
+
+    task: Mapping[str, Any]
+    policy: Mapping[str, Any]
+    making: Mapping[str, Any]
+    environment: Mapping[str, Any]
+    episodes: tuple[EpisodeReceipt, ...]
+    claimed: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        """Refuse parts that no receipt has.
+
+        Raises:
+            ReceiptError: If a part is of another kind, or there are no episodes, or one twice.
+        """
+        kinds = {"task": _Task, "policy": _Policy, "making": _Making, "environment": _Environment}
+        for name, kind in kinds.items():
+            check(getattr(self, name), kind, name, ReceiptError)
+        seeds = Counter(episode.seed for episode in self.episodes)
+        if not seeds:
+            raise ReceiptError("a receipt has one episode or more; this has none")
+        if twice := [seed for seed, count in seeds.items() if count > 1]:
+            raise ReceiptError(f"a receipt has each seed once; this has seed {twice[0]} twice")
+
+    @property
+    def hash(self) -> str:
+        """SHA-256, in hex, of everything but the environment."""
+        return _hash(self._content())
+
+    @property
+    def success_rate(self) -> float:
+        """The share of episodes that ended in success."""
+        return mean(episode.success for episode in self.episodes)
+
+    @property
+    def untouched(self) -> bool:
+        """Whether the content is what its file's hash says; True if it comes from no file."""
+        return self.claimed in ("", self.hash)
+
+    def write(self, path: str | PathLike[str]) -> None:
+        """Write it as json, whole or not at all.
+
+        Raises:
+            UnwritableFileError: If it cannot be written (also an ``OSError``).
+        """
+        head = {"format": FORMAT, "hash": self.hash, **self._content()}
+        head["environment"] = self.environment
+        episodes = ",\n".join(f"  {json.dumps(episode)}" for episode in head.pop("episodes"))
+        text = json.dumps(head, indent=1).removesuffix("\n}")
+        write_whole(path, f'{text},\n "episodes": [\n{episodes}\n ]\n}}\n')
+
+    @classmethod
+    def read(cls, path: str | PathLike[str]) -> Receipt:
+        """Read one.
+
+        Raises:
+            ReceiptError: If the file cannot be read, or is no receipt.
+        """
+        try:
+            found = read_json(path, MAX_BYTES)
+            check(found, _Receipt, "")
+            episodes = tuple(_episode(about) for about in found["episodes"])
+            parts = {name: found[name] for name in ("task", "policy", "making", "environment")}
+            return cls(**parts, episodes=episodes, claimed=found["hash"])
+        except UnreadableFileError as error:
+            raise ReceiptError(str(error)) from error
+        except (FieldError, ReceiptError) as error:
+            raise ReceiptError(f"{path} is no receipt: {error}") from error
+
+    def _content(self) -> dict[str, Any]:
+        """Return everything but the environment, as plain data."""
+        return {
+            "task": self.task,
+            "policy": self.policy,
+            "making": self.making,
+            "episodes": [_brief(episode) for episode in self.episodes],
+        }
+
+
+def _brief(episode: EpisodeReceipt) -> dict[str, Any]:
+    """Return an episode as plain data, without a reason if there is none."""
+    return {name: value for name, value in asdict(episode).items() if value != ""}
+
+
+def _episode(about: Mapping[str, Any]) -> EpisodeReceipt:
+    names = EpisodeReceipt.__dataclass_fields__
+    return EpisodeReceipt(**{name: about[name] for name in names if name in about})
+
+
+def _hash(content: Mapping[str, Any]) -> str:
+    return sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,183 @@
+"""Plays the episodes of a receipt again, and names what is not the same."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from shlex import quote
+
+from layouts.placement import RobotLike
+from robot_layouts.core.bounds import checked_whole
+from robot_layouts.data.playing.casting import cast_of
+from robot_layouts.data.playing.evaluation_job import EvaluationJob, scores_of
+from robot_layouts.data.playing.executor import Event, Executor, choose_executor
+from robot_layouts.data.playing.together import grouped
+from robot_layouts.data.receipts.comparison import (
+    Change,
+    EpisodeDifference,
+    changes,
+    episode_differences,
+)
+from robot_layouts.data.receipts.making import make_again
+from robot_layouts.data.receipts.provenance import EXPERT, describe_job, receipt_of
+from robot_layouts.data.receipts.receipt import Receipt, ReceiptError
+from robots import RobotLayoutsError
+from tasks import MultiRobotTask, get_task_class
+from tasks.episode import Policy
+from tasks.registry import TASKS, make_scenario
+
+_SHOWN = 10  # episodes that a text names
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The result of playing the episodes of a receipt again.
+
+    Attributes:
+        receipt: The receipt.
+        here: The receipt of what was played here.
+    """
+
+    receipt: Receipt
+    here: Receipt
+
+    @property
+    def equal(self) -> bool:
+        """Whether all is the same but, perhaps, the environment: every bit, and every file."""
+        return self.receipt.untouched and self.receipt.hash == self.here.hash
+
+    @cached_property
+    def differences(self) -> tuple[EpisodeDifference, ...]:
+        """The episodes that were not the same, in the receipt's order."""
+        return tuple(episode_differences(self.receipt, self.here))
+
+    @cached_property
+    def changed(self) -> tuple[Change, ...]:
+        """What they depend on and is not as in the receipt: versions, files, processor, …."""
+        return tuple(changes(self.receipt, self.here))
+
+    def __repr__(self) -> str:
+        """Show it as a few lines."""
+        receipt, total = self.receipt, len(self.receipt.episodes)
+        lines = [
+            f"{receipt.task['id']}, {receipt.policy['name']}: {total - len(self.differences)} of"
+            f" {total} episodes equal to the last bit",
+            *map(str, self.differences[:_SHOWN]),
+        ]
+        if more := len(self.differences[_SHOWN:]):
+            lines.append(f"and {more} episodes more")
+        if self.changed:
+            lines += ["not as in the receipt:", *(f"  {change}" for change in self.changed)]
+        return "\n".join(lines)
+
+
+def verify(
+    receipt: Receipt | str | PathLike[str],
+    executor: Executor | None = None,
+    on_event: Callable[[Event], None] = lambda event: None,
+    *,
+    workers: int | None = None,
+    policy: Policy | str | None = None,
+    task: str | None = None,
+    robots: Mapping[str, RobotLike] | None = None,
+    num_envs: int = 1,
+) -> Verification:
+    """Play the episodes of a receipt again, and compare everything.
+
+    A receipt does not choose which code runs: experts play, and tasks that this library or an
+    installed package lists. Any other policy or task has to be named, and its module is compared
+    with the receipt's afterwards. No episode is played further than one step beyond the receipt's.
+
+    Args:
+        receipt: A receipt, or its file.
+        executor: Who plays; None: as many processes as ``workers`` says.
+        on_event: Called with each event of the executor, to show progress.
+        workers: How many processes play; None: one for each core that this process may use; 0:
+            none, but this one.
+        policy: The policy, unless it is an expert: as `robot_layouts.data.evaluate` takes it.
+        task: The task, ``module:Id``, if no installed package lists it and its module has not been
+            imported yet.
+        robots: Which robots these were, by place, where the receipt cannot say it.
+        num_envs: How many episodes each process plays at once. Those of a batched policy are
+            played as many at once as when the receipt was written.
+
+    Raises:
+        ReceiptError: If it is no receipt or cannot be read, or its task or policy is not available
+            here or has to be named.
+        TaskError: If something is given that is no policy, or both ``workers`` and an executor.
+        AssetError: If robot files cannot be found.
+        WorkerError: If the policy raised something, or workers die of it again and again.
+    """
+    recorded = receipt if isinstance(receipt, Receipt) else Receipt.read(receipt)
+    with _naming_variables(recorded):
+        checked_whole("num_envs", num_envs, 1, None, ReceiptError)
+        cls = _task(recorded, task)
+        if policy is None:
+            _expect_policy(recorded)
+        cast, name = cast_of(EXPERT if policy is None else policy, cls)
+        guessed = recorded.environment.get("guessed", {})
+        making = make_again(recorded.making, guessed, cls, robots or {})
+        seeds = [episode.seed for episode in recorded.episodes]
+        at_once = recorded.making.get("num_envs", min(num_envs, len(seeds)))
+        scenario = make_scenario(cls, at_once, **making)
+        try:
+            scenario.check(cls.reward_modes)
+        except RobotLayoutsError as error:
+            raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
+        most_steps = {episode.seed: episode.steps + 1 for episode in recorded.episodes}
+        job = EvaluationJob(cls, scenario, cast, grouped(seeds, at_once), True, most_steps)
+        described = describe_job(job, name)
+        scores = scores_of(choose_executor(workers, executor), job, on_event)
+        return Verification(
+            recorded, receipt_of(described, job, {seed: scores[seed] for seed in seeds})
+        )
+
+
+@contextmanager
+def _naming_variables(receipt: Receipt) -> Generator[None]:
+    """Let every error of this library name the policy's variables that are not set here."""
+    try:
+        yield
+    except RobotLayoutsError as error:
+        names = receipt.environment.get("variables", "").split()
+        if unset := [name for name in names if name not in os.environ]:
+            hint = (
+                "environment variables that were set when the receipt was written, and are not here"
+            )
+            error.args = (f"{error}; {hint}: {', '.join(unset)}", *error.args[1:])
+        raise
+
+
+def _task(receipt: Receipt, name: str | None) -> type[MultiRobotTask]:
+    """Return the class of a receipt's task."""
+    recorded, module = receipt.task["id"], receipt.task["class"].partition(":")[0]
+    if name is None and recorded not in TASKS:
+        raise ReceiptError(
+            f"the receipt is of the task {recorded}, which nothing installed lists, and a receipt"
+            f" does not choose which code runs; to play what is here, type:"
+            f" --task {quote(f'{module}:{recorded}')}"
+        )
+    cls = get_task_class(name or recorded)
+    if name is not None and cls.task_id != recorded:
+        raise ReceiptError(f"the receipt is of {recorded}, not of {cls.task_id}")
+    return cls
+
+
+def _expect_policy(receipt: Receipt) -> None:
+    """Refuse a receipt of another player than an expert."""
+    kind, name = receipt.policy["kind"], receipt.policy["name"]
+    if kind == EXPERT:
+        return
+    if receipt.policy.get("importable") is not True:
+        raise ReceiptError(
+            f"the receipt's policy {name} was no variable of a module, and cannot be imported"
+            " again; pass it to robot_layouts.data.receipts.verify as policy=…"
+        )
+    raise ReceiptError(
+        f"the receipt is of the policy {name}, and a receipt does not choose which code runs; to"
+        f" play what is here, type: --policy {quote(name)}"
+    )

@@ -1,0 +1,279 @@
+"""Finished episodes, each in a small file of its own until the recording ends.
+
+A part is a line that says what it is, two lines of json, the bytes of its arrays, and a checksum of
+all that. It is written while episodes are played, where an h5 file of as many arrays would cost
+fifteen times as much.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+from typing_extensions import NotRequired, TypedDict
+
+from robot_layouts.core.files import parse_json, read_regular
+from robot_layouts.core.schema import AnyText, FieldError, Object, check, whole
+from robot_layouts.core.writing import PARTIAL, written_whole
+from robot_layouts.data.reading.hdf5 import MAX_BYTES
+from robot_layouts.data.reading.provenance import STATES
+from robot_layouts.data.reading.summary import MAX_SEED, OwnEpisode
+from robots import RecordingError
+from tasks.episode import REBUILT, PlayedEpisode
+
+_SUFFIX = ".part"
+_SEED = re.compile(r"seed-([0-9]{10,})")
+_OPENING = b"robot-layouts episode 1\n"
+_CHECKSUM = 4  # bytes
+_ARRAY_BYTES, _GROUP_BYTES = 256, 1024  # that HDF5 takes besides numbers and texts, about
+_MAX_PART = MAX_BYTES + 2**24  # bytes
+
+_ARRAY_NAME = (
+    r"^(actions|rewards|success|terminated|truncated|actor|corrections"
+    r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3})\Z"
+)
+
+
+class _Attributes(TypedDict):
+    episode: AnyText
+    action_split: NotRequired[AnyText]
+
+
+class _Content(TypedDict):
+    attributes: _Attributes
+    arrays: list[
+        tuple[
+            Annotated[str, Meta(pattern=_ARRAY_NAME, description="the name of an array")],
+            Literal["<f4", "<f8", "|b1", "|u1"],
+            list[Annotated[int, whole(0, MAX_BYTES)]],
+        ]
+    ]
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What is stored of an episode.
+
+    Attributes:
+        attributes: Attributes of its group in the h5 file; ``episode`` is its entry in the json,
+            without ``episode_id``.
+        arrays: The arrays of that group by their names there, as ``env_states/actors/cube``.
+
+    The attributes do not include the checksum.
+    """
+
+    attributes: Mapping[str, str]
+    arrays: Mapping[str, NDArray[Any]]
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """Its entry in the json, without ``episode_id``."""
+        return json.loads(self.attributes["episode"])
+
+    @property
+    def size(self) -> int:
+        """About how many bytes it takes in an h5 file; the same whatever file it is in."""
+        numbers = sum(rows.nbytes for rows in self.arrays.values())
+        return _size(self.attributes, len(self.arrays), numbers)
+
+
+@dataclass(frozen=True)
+class PartEncoder:
+    """Encodes finished episodes; worker processes each have a copy.
+
+    Attributes:
+        header: What the episodes have in common; every part carries it.
+        control_mode: Control mode as ManiSkill writes it: by robot where there are several.
+    """
+
+    header: Mapping[str, Any]
+    control_mode: str | dict[str, str]
+    _text: bytes = field(init=False, repr=False)
+    _split: str = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Write as text once what all parts say."""
+        split = {name: robot["action"] for name, robot in self.header["layout"].items()}
+        object.__setattr__(self, "_text", json.dumps(self.header).encode())
+        object.__setattr__(self, "_split", json.dumps(split))
+
+    def encode(self, episode: PlayedEpisode) -> bytes:
+        """Return the part of an episode."""
+        attributes = {"action_split": self._split, "episode": json.dumps(self._about(episode))}
+        return self.encode_stored(Stored(attributes, _arrays(episode)))
+
+    def encode_stored(self, stored: Stored) -> bytes:
+        """Return the part of an episode that was joined already."""
+        arrays = stored.arrays
+        about = {
+            "attributes": dict(stored.attributes),
+            "arrays": [(name, rows.dtype.str, rows.shape) for name, rows in arrays.items()],
+        }
+        numbers = [rows.tobytes() for rows in arrays.values()]
+        content = b"".join(
+            [_OPENING, self._text, b"\n", json.dumps(about).encode(), b"\n", *numbers]
+        )
+        return content + _checksum(content)
+
+    def _about(self, episode: PlayedEpisode) -> dict[str, Any]:
+        return {
+            "episode_seed": episode.seed,
+            "control_mode": self.control_mode,
+            "elapsed_steps": len(episode.actions),
+            "reset_kwargs": {"seed": episode.seed, "options": REBUILT},
+            "success": episode.solved,
+            **({"reason": episode.reason} if episode.reason else {}),
+            **({"source": dict(episode.source)} if episode.source is not None else {}),
+            **({"drawn": dict(episode.drawn)} if episode.drawn is not None else {}),
+        }
+
+
+def write_part(folder: Path, seed: int, part: bytes, *, sync: bool = False) -> None:
+    """Write an encoded episode; it is there, whole, when this returns, or not at all.
+
+    Args:
+        folder: Where to write.
+        seed: Its seed.
+        part: What `PartEncoder.encode` returned, perhaps on another machine.
+        sync: Whether to wait until it is on the disk.
+
+    Raises:
+        RecordingError: If it cannot be written.
+    """
+    path = part_path(folder, seed)
+    with written_whole(path, RecordingError, parents=False, sync=sync) as partial:
+        partial.write_bytes(part)
+
+
+def part_path(folder: Path, seed: int) -> Path:
+    """Return the part of a seed; names sort as seeds do."""
+    return folder / f"seed-{seed:010d}{_SUFFIX}"
+
+
+def seed_of(part: Path) -> int:
+    """Return the seed of a part, from its name.
+
+    Raises:
+        ValueError: If it is not the name of a part.
+    """
+    found = _SEED.fullmatch(part.stem)
+    seed = int(found[1]) if found and part.suffix == _SUFFIX else -1
+    if not 0 <= seed <= MAX_SEED or part_path(part.parent, seed) != part:
+        raise ValueError(f"{part.name} is not the name of a part")
+    return seed
+
+
+def list_parts(folder: Path) -> list[Path]:
+    """Return the parts in a folder, sorted by seed; none if there is no folder."""
+    return sorted(path for path in folder.glob(f"seed-*{_SUFFIX}") if _is_part(path))
+
+
+def refuse_foreign(folder: Path) -> None:
+    """Refuse a folder of parts that holds something else, which nobody should delete.
+
+    Raises:
+        RecordingError: If so.
+    """
+    for path in sorted(folder.iterdir()):
+        ours = path.suffix == PARTIAL or _is_part(path)
+        if not ours or path.is_symlink() or not path.is_file():
+            raise RecordingError(
+                f"{path} is no episode of this library, in a folder that is for such episodes only;"
+                " move it somewhere else"
+            )
+
+
+def part_size(part: bytes) -> int:
+    """Return the `Stored.size` of an episode that was just encoded."""
+    about, numbers = part.split(b"\n", 3)[2:]
+    described = json.loads(about)
+    return _size(described["attributes"], len(described["arrays"]), len(numbers) - _CHECKSUM)
+
+
+def read_part(path: Path) -> tuple[dict[str, Any], Stored]:
+    """Return the header of a part and its episode.
+
+    Raises:
+        RecordingError: If it is damaged, or the episode of another seed than its name says.
+        UnreadableFileError: If it cannot be read.
+    """
+    content = read_regular(path, _MAX_PART)
+    whole, checksum = content[:-_CHECKSUM], content[-_CHECKSUM:]
+    if not whole.startswith(_OPENING) or checksum != _checksum(whole):
+        raise RecordingError(f"{path} is damaged, or not an episode of this library")
+    try:
+        header, stored = _parse(whole.removeprefix(_OPENING))
+    except ValueError as error:
+        raise RecordingError(f"{path} is not an episode of this library: {error}") from error
+    seed = stored.about["episode_seed"]
+    if seed != seed_of(path):
+        raise RecordingError(f"{path} is the episode of seed {seed}, under another's name")
+    return header, stored
+
+
+def _parse(content: bytes) -> tuple[dict[str, Any], Stored]:
+    """Return what a part says after its opening.
+
+    Raises:
+        ValueError: If it is not as `PartEncoder` writes it.
+    """
+    header, about, numbers = content.split(b"\n", 2)
+    described, listed = _parse_header(header), parse_json(about.decode())
+    check(listed, _Content, "")
+    arrays: dict[str, NDArray[Any]] = {}
+    start = 0
+    for array in listed["arrays"]:
+        name, dtype, shape = array
+        count = min(math.prod(shape), MAX_BYTES)
+        arrays[name] = np.frombuffer(numbers, dtype, count, start).reshape(shape).copy()  # aligned
+        start += arrays[name].nbytes
+    about = parse_json(listed["attributes"]["episode"])
+    check(about, OwnEpisode, "episode")
+    if start != len(numbers) or len(arrays.get("actions", ())) != about["elapsed_steps"]:
+        raise FieldError("its arrays are not those of its steps")
+    return described, Stored(listed["attributes"], arrays)
+
+
+@lru_cache(maxsize=1)  # all parts of a recording have the same
+def _parse_header(content: bytes) -> dict[str, Any]:
+    header = parse_json(content.decode())
+    check(header, Object, "header")
+    return header
+
+
+def _is_part(path: Path) -> bool:
+    try:
+        seed_of(path)
+    except ValueError:
+        return False
+    return True
+
+
+def _arrays(episode: PlayedEpisode) -> dict[str, NDArray[Any]]:
+    arrays: dict[str, NDArray[Any]] = {"actions": episode.actions}
+    for kind, entries in episode.states.items():
+        arrays.update({f"{STATES}{kind}/{name}": rows for name, rows in entries.items()})
+    for name in ("rewards", "success", "terminated", "truncated"):
+        arrays[name] = getattr(episode, name)
+    for name in ("actor", "corrections"):
+        if (rows := getattr(episode, name)) is not None:
+            arrays[name] = rows
+    return arrays
+
+
+def _size(attributes: Mapping[str, str], arrays: int, numbers: int) -> int:
+    return numbers + arrays * _ARRAY_BYTES + sum(map(len, attributes.values())) + _GROUP_BYTES
+
+
+def _checksum(content: bytes) -> bytes:
+    return zlib.crc32(content).to_bytes(_CHECKSUM, "little")

@@ -1,0 +1,320 @@
+"""Writes episodes in ManiSkill's own trajectory format, h5 with a json beside it."""
+
+from __future__ import annotations
+
+import glob
+import math
+import os
+import re
+import weakref
+from collections import deque
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+from types import TracebackType
+from typing import NamedTuple
+
+from robot_layouts.core.writing import PARTIAL
+from robot_layouts.data.reading.manifest import FILE_SIZE
+from robot_layouts.data.reading.provenance import (
+    describe_layout,
+    describe_task,
+    header_differences,
+    listing,
+    recorded_control_mode,
+)
+from robot_layouts.data.recording.disk import claim, disk_errors
+from robot_layouts.data.recording.episode_files import (
+    PartEncoder,
+    list_parts,
+    part_path,
+    part_size,
+    read_part,
+    refuse_foreign,
+    seed_of,
+    write_part,
+)
+from robot_layouts.data.recording.joined_files import JoinedFiles, OpenFile
+from robot_layouts.data.sources.actors import Source, combined, source_of
+from robots import RecordingError, TaskError
+from tasks import TaskEnv
+from tasks.episode import PlayedEpisode
+
+__all__ = ["FILE_SIZE", "Recorder", "describe_layout"]
+
+
+class _Part(NamedTuple):
+    """A finished episode that is not joined yet: its size (bytes), and what its header says."""
+
+    size: int
+    source: Source
+
+
+class Recorder:
+    """A recording that grows by whole episodes; whatever ends it, the finished ones stay.
+
+    Each finished episode is a file of its own in a folder beside the recording. They are joined in
+    the order of their seeds by `close`, and before that as soon as they fill a file. If the process
+    is killed before, the next Recorder that resumes the recording finds them there.
+
+    A recording that does not fit into one file goes on in ``trajectory_0001.h5`` and so on, each a
+    recording by itself; see `manifest`. If `expect` was told which seeds come, the
+    files are the same in whichever order they come; they are full when the next episode would not
+    fit any more.
+
+    In the h5 file ``traj_i`` holds the flat actions (T, A), env states (T + 1, k), rewards and
+    flags (T,). Its attribute ``action_split`` is json: robot name → first and last + 1 action
+    number. The file's attributes ``layout`` and ``simulation`` are json too; see
+    `robot_layouts.data.reading.provenance`.
+
+    Attributes:
+        path: The first h5 file.
+        json_path: The json file beside it.
+        parts: The folder of finished episodes that are not joined yet.
+        damaged: Episodes that were there and are damaged, by their files or groups, in words;
+            they do not count as recorded.
+        encoder: Encodes one episode; may be handed to worker processes.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        task: TaskEnv,
+        *,
+        overwrite: bool = False,
+        resume: bool = False,
+        source: str = "scripted",
+        source_desc: str | None = None,
+        file_size: float = FILE_SIZE,
+    ) -> None:
+        """Begin a recording, or go on with one.
+
+        Args:
+            path: Name of the first h5 file; its folder is made.
+            task: The task whose episodes are recorded.
+            overwrite: Whether a recording that is already there may be replaced.
+            resume: Whether to keep the episodes that are already there.
+            source: Where the actions come from, in ManiSkill's words (``source_type``).
+            source_desc: The same in your own words.
+            file_size: Size at which a further h5 file is begun (MB); full ones stay as they are.
+
+        Raises:
+            RecordingError: If there is a recording already and neither ``overwrite`` nor
+                ``resume``, it is of something else or in use by another process, or the folder
+                cannot be written.
+            TaskError: If the size makes no sense.
+            AssetError: If robot files cannot be found.
+        """
+        if not 0 < file_size < math.inf:
+            raise TaskError(f"file_size is {file_size!r}; it must be MB, more than 0")
+        self.path = Path(path)
+        self.json_path = self.path.with_suffix(".json")
+        self.parts = self.path.with_suffix(".parts")
+        self.damaged: list[str] = []
+        self._header, self._limit = describe_task(task, source, source_desc), file_size * 1e6
+        self._waiting: dict[int, _Part] = {}  # by seed
+        self._coming: deque[int] = deque()
+        self._given_up = set[int]()
+        with disk_errors(self.path):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            if os.path.lexists(self.parts) and not self.parts.is_dir():
+                raise RecordingError(f"{self.parts} is no folder; move it somewhere else")
+            lock = claim(self.parts)
+            if lock is None:
+                raise RecordingError(f"another process is recording into {self.parts}")
+            try:
+                self._files = JoinedFiles(self.path, self._header)
+                self._begin(overwrite=overwrite, resume=resume)
+            except BaseException:
+                with suppress(OSError):  # not empty
+                    self.parts.rmdir()
+                os.close(lock)
+                raise
+        self._release = weakref.finalize(self, os.close, lock)
+        mode = recorded_control_mode(task)
+        self.encoder = PartEncoder(self._header, mode)
+        self._closed = False
+
+    def __enter__(self) -> Recorder:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close the recording; if it ends by an error, that is the one that counts."""
+        try:
+            self.close()
+        except RecordingError:
+            if error is None:
+                raise
+
+    def __len__(self) -> int:
+        """Return the number of episodes recorded."""
+        return len(self.seeds)
+
+    @property
+    def seeds(self) -> set[int]:
+        """Seeds of all episodes recorded."""
+        return {*self._files.seeds, *self._waiting}
+
+    def expect(self, seeds: Iterable[int]) -> None:
+        """Say which episodes will come, so that files do not depend on their order."""
+        self._coming = deque(sorted({*self._coming, *seeds}))
+
+    def give_up(self, seed: int) -> None:
+        """Say that an expected episode will not come; those after it are not kept waiting."""
+        self._given_up.add(seed)
+
+    def add(self, episode: PlayedEpisode) -> None:
+        """Write one episode; it is kept when this returns.
+
+        Raises:
+            RecordingError: If it cannot be written; the episodes before it stay. Also if there
+                is one of that seed already, or the recording was closed.
+        """
+        self.store(episode.seed, self.encoder.encode(episode))
+
+    def store(self, seed: int, part: bytes) -> None:
+        """Write an episode that the `encoder` encoded, perhaps elsewhere; else as `add`."""
+        if self._closed:
+            raise RecordingError(f"cannot write {self.path}: the recording was closed")
+        if seed in self.seeds:
+            raise RecordingError(f"{self.path} has an episode of seed {seed} already")
+        write_part(self.parts, seed, part)
+        self._waiting[seed] = _Part(part_size(part), source_of(self._header))
+        while (full := self._full_file()) is not None:
+            self._fill_last(full)
+
+    def close(self) -> None:
+        """Join the episodes into h5 files and write the json; closing twice is allowed.
+
+        Raises:
+            RecordingError: If they cannot be written; the finished episodes stay where they are.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            self._join()
+        finally:
+            self._release()
+
+    def _begin(self, *, overwrite: bool, resume: bool) -> None:
+        """Check and tidy what is there."""
+        refuse_foreign(self.parts)
+        parts, files = list_parts(self.parts), self._files
+        there = [p for p in (*files.paths, files.manifest, *parts) if p.exists()]
+        if there and not (overwrite or resume):
+            raise RecordingError(
+                f"{there[0]} is there already; choose another name, or pass overwrite=True to"
+                " replace the recording or resume=True to go on with it"
+            )
+        for left_over in self._left_over():
+            left_over.unlink(missing_ok=True)
+        if overwrite:
+            files.remove()
+            for part in parts:
+                part.unlink(missing_ok=True)
+        files.read()
+        self.damaged += files.damaged
+        for part in list_parts(self.parts):
+            self._check_part(part)
+
+    def _left_over(self) -> list[Path]:
+        """Return the files that a kill left half written."""
+        pattern, own = f"{glob.escape(self.path.stem)}*{PARTIAL}", re.escape(self.path.stem)
+        number = "(_[0-9]{4,})?" if self._files.manifest.exists() else ""
+        name = re.compile(rf"{own}{number}\..*{re.escape(PARTIAL)}")
+        beside = (path for path in self.path.parent.glob(pattern) if name.fullmatch(path.name))
+        return [*chain(self.parts.glob(f"*{PARTIAL}"), beside)]
+
+    def _check_part(self, part: Path) -> None:
+        """Refuse a part of another recording; remove one that is damaged or already joined."""
+        try:
+            header, stored = read_part(part)
+        except RecordingError:  # by a power cut, say: its episode is recorded again
+            self.damaged.append(str(part))
+            part.unlink()
+            return
+        if found := header_differences(header, self._header):
+            raise RecordingError(
+                f"{part} was recorded with something else, so this recording cannot go on there"
+                f" ({listing(found)}); choose another folder"
+            )
+        if seed_of(part) in self._files.seeds:
+            part.unlink()
+        else:
+            self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
+
+    def _full_file(self, *, certain: bool = False) -> list[int] | None:
+        """Return the seeds of the next full file; None if there is not enough for one.
+
+        Args:
+            certain: Whether not to wait for those that are expected before.
+        """
+        lost = {seed for file in self._files.mending.values() for seed in file.lost}
+        sizes = {seed: held.size for seed, held in self._files.last.episodes.items()}
+        sizes |= {seed: part.size for seed, part in self._waiting.items() if seed not in lost}
+        if sum(sizes.values()) <= self._limit:
+            return None
+        missing = math.inf if certain else self._first_missing()
+        seeds, total = list[int](), 0
+        for seed in sorted(sizes):
+            if seed > missing:
+                return None
+            total += sizes[seed]
+            if seeds and total > self._limit:
+                return seeds
+            seeds.append(seed)
+        return None
+
+    def _first_missing(self) -> float:
+        """Return the least seed that is expected and has not come."""
+        came = self._waiting, self._files.seeds, self._given_up
+        while self._coming and any(self._coming[0] in seeds for seeds in came):
+            self._coming.popleft()
+        return self._coming[0] if self._coming else math.inf
+
+    def _fill_last(self, seeds: list[int]) -> None:
+        """Write the last file with some episodes, and begin another one."""
+        file = self._files.last
+        header = {**self._header, **combined(file.sources)}
+        encoder = replace(self.encoder, header=header)
+        spilt = [seed for seed in file.episodes if seed not in set(seeds)]
+        for seed, stored in self._files.read_groups(file, spilt) if spilt else ():
+            write_part(self.parts, seed, encoder.encode_stored(stored), sync=True)
+            self._waiting[seed] = _Part(stored.size, source_of(header))
+        self._write(file, seeds, last=False)
+
+    def _write(self, file: OpenFile, seeds: Iterable[int], *, last: bool) -> None:
+        """Write a file and the manifest; then the parts that it was joined from are deleted."""
+        parts = {s: part_path(self.parts, s) for s in seeds if s not in file.episodes}
+        places = {s: parts.get(s) or file.episodes[s].group for s in sorted(seeds)}
+        sources = {self._waiting[seed].source for seed in parts}
+        self._files.write(file, places, sources, last=last)
+        self._files.write_manifest()
+        for seed, part in parts.items():
+            part.unlink(missing_ok=True)
+            self._waiting.pop(seed, None)
+
+    def _join(self) -> None:
+        for file in self._files.mending.values():
+            if again := file.lost & self._waiting.keys():
+                self._write(file, {*file.episodes, *again}, last=False)
+        waiting = sum(part.size for part in self._waiting.values())
+        certain = waiting > 2 * self._limit  # not much waits for few that lack
+        while (full := self._full_file(certain=certain)) is not None:
+            self._fill_last(full)
+        last = self._files.last
+        if seeds := {*last.episodes, *self._waiting}:
+            self._write(last, seeds, last=True)
+        else:
+            self._files.write_empty()
+        with suppress(OSError):  # something else was put there meanwhile, and is not ours to delete
+            self.parts.rmdir()

@@ -1,0 +1,224 @@
+"""Takes one robot through the waypoints of its script."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi, remainder
+
+import numpy as np
+
+from robot_layouts.experts.driver import ArmDriver
+from robot_layouts.experts.geometry import heading
+from robot_layouts.experts.script import OPEN, Scene, Waypoint
+from robot_layouts.experts.tips import pose_solver
+from robot_layouts.experts.ways import NoWayError, Ways
+from robot_layouts.kinematics.rotations import Floats, inverse, rotate
+from robot_layouts.kinematics.solve import by_way
+from robot_layouts.simulation.checks.overlaps import RobotsAlone
+from tasks import TaskEnv
+
+PATIENCE = 40  # control steps without progress after which an arm counts as blocked
+PROGRESS = 1e-3  # rad
+VIA = 0.06  # rad: so near an arm comes to each place of a way round before it goes on
+AGAIN, WAITING = 4, 100  # control steps after which an arm that waits looks again, and gives up
+
+
+class StuckError(Exception):
+    """A robot cannot go on with its script."""
+
+
+class BlockedError(StuckError):
+    """Something is in its way."""
+
+
+class Player:
+    """Takes one robot through its waypoints."""
+
+    def __init__(
+        self,
+        task: TaskEnv,
+        robot: str,
+        waypoints: Sequence[Waypoint],
+        scene: Scene,
+        alone: RobotsAlone,
+    ) -> None:
+        """Take a robot and what it is to do.
+
+        Args:
+            task: Says where it stands.
+            robot: Its name in the layout.
+            waypoints: What it does, one thing after the other.
+            scene: As it is now.
+            alone: Tells whether it is inside itself.
+        """
+        self._robot, self._waypoints = robot, list(waypoints)
+        self._driver = ArmDriver(task.layout.arm(robot).robot)
+        if any(waypoint.to is not None for waypoint in waypoints):
+            self._kinematics = pose_solver(task, robot)
+            self._alone, self._owner = alone, task.layout.owner(robot)
+            joints = task.layout[self._owner].robot.joints
+            self._own = [joints.index(joint) for joint in task.layout.arm(robot).robot.arm_joints]
+        if any(waypoint.at is not None for waypoint in waypoints):
+            self._reach = task.simulation.backend.point_reach(robot)
+            self._base = scene.base(robot)
+        self._goal = self._driver.arm(scene.qpos(robot))
+        self._gripper = OPEN
+        self._current: Waypoint | None = None
+        self._begun = self._elapsed = 0  # waypoints begun; steps taken in the current one
+        self._later: list[Floats] = []  # where it goes after its goal
+        self._ways: Ways | None = None
+        self._delayed = 0  # control steps that it has waited for a free way
+
+    def look_around(self, ways: Ways, players: Sequence[Player]) -> None:
+        """From now on begin ways only if they are free, and go round what is in the way.
+
+        Args:
+            ways: Finds ways.
+            players: All arms, this one included.
+        """
+        self._ways = ways
+        self._others = {
+            name: player
+            for player in players
+            if (name := ways.known(player._robot)) and player is not self
+        }
+
+    def ahead(self, scene: Scene) -> Floats:
+        """Return what lies before the arm, (n, arm joints) (rad), beginning where it is."""
+        return np.stack([self._arm(scene), self._goal, *self._later])
+
+    @property
+    def place(self) -> str:
+        """Where it is in its script, as ``robot.waypoint``."""
+        return f"{self._robot}.{self._current.name if self._current else 'start'}"
+
+    def act(self, scene: Scene, done: set[str]) -> Floats:
+        """Return the next action numbers; adds what is done to ``done``.
+
+        Raises:
+            StuckError: If the next waypoint cannot be reached, or the present one takes too long.
+        """
+        self._go_on(scene)
+        if self._current is not None:
+            if self._is_done(self._current, scene):
+                done.add(self.place)
+            most = self._current.most
+            if most is not None and self._elapsed >= most and self.place not in done:
+                raise StuckError(f"{self.place} took more than {most} steps")
+        if self._may_begin(done):
+            self._begin(self._waypoints[self._begun], scene)
+        self._elapsed += 1
+        return self._driver.action(self._goal, self._gripper, scene.qpos(self._robot))
+
+    def _arm(self, scene: Scene) -> Floats:
+        return self._driver.arm(scene.qpos(self._robot))
+
+    def _check_progress(self, away: float) -> None:
+        """Give up if the arm is kept from its goal: for `PATIENCE` steps it came no nearer."""
+        if away < self._nearest_yet - PROGRESS:
+            self._nearest_yet, self._waited = away, 0
+        self._waited += 1
+        if self._waited > PATIENCE:
+            raise BlockedError(f"{self.place} is blocked {away:.2f} rad before its end")
+
+    def _is_done(self, waypoint: Waypoint, scene: Scene) -> bool:
+        if self._elapsed < waypoint.steps:
+            return False
+        if (waypoint.to, waypoint.turn, waypoint.at) != (None, None, None):
+            away = np.abs(self._arm(scene) - self._goal).max()
+            if self._later or away > waypoint.near:
+                self._check_progress(float(away))
+                return False
+        return waypoint.until is None or waypoint.until(scene)
+
+    def _may_begin(self, done: set[str]) -> bool:
+        if self._begun == len(self._waypoints):
+            return False
+        if self._current is not None and self.place not in done:
+            return False
+        return all(name in done for name in self._waypoints[self._begun].after)
+
+    def _go_on(self, scene: Scene) -> None:
+        """Go to the next place of a way round once the arm is near the one before."""
+        if not self._later:
+            return
+        away = np.abs(self._arm(scene) - self._goal).max()
+        if away < VIA:
+            self._goal = self._later.pop(0)
+            self._nearest_yet, self._waited = np.inf, 0
+
+    def _begin(self, waypoint: Waypoint, scene: Scene) -> None:
+        name = f"{self._robot}.{waypoint.name}"
+        goals = self._goals(name, waypoint, scene)
+        if goals and self._ways is not None:
+            way = self._free_way(name, goals, scene)
+            if way is None:
+                return
+            self._goal, *self._later = way
+        elif goals:
+            free = (goal for goal in goals if waypoint.to is None or self._is_free(goal, scene))
+            self._goal = next(free, goals[0])
+        self._current, self._gripper = waypoint, waypoint.gripper
+        self._begun, self._elapsed = self._begun + 1, 0
+        self._nearest_yet, self._waited = np.inf, 0
+
+    def _goals(self, name: str, waypoint: Waypoint, scene: Scene) -> list[Floats]:
+        """Return arm joints that a waypoint may end at, the shortest way first; none if it stays.
+
+        Raises:
+            StuckError: If there are none.
+        """
+        arm = self._arm(scene)
+        if waypoint.to is not None:
+            qpos, solutions = scene.qpos(self._robot), self._kinematics.solutions
+            goals = [goal for pose in waypoint.to(scene) for goal in solutions(*pose, qpos)]
+        elif waypoint.turn is not None:
+            goals = [arm + waypoint.turn(arm)]
+        elif waypoint.at is not None:
+            goals = self._reaching(waypoint.at(scene), scene)
+        else:
+            return []
+        if not goals:
+            raise StuckError(f"{name} is out of reach")
+        return by_way(goals, arm)
+
+    def _free_way(self, name: str, goals: Sequence[Floats], scene: Scene) -> list[Floats] | None:
+        """Return a way that touches nothing; None while others have to move on before.
+
+        Raises:
+            BlockedError: If they do not in time.
+        """
+        assert self._ways is not None
+        self._delayed += 1
+        if self._delayed % AGAIN != 1:
+            return None
+        ahead = {name: player.ahead(scene) for name, player in self._others.items()}
+        try:
+            way = self._ways.find(self._robot, goals, scene, ahead)
+        except NoWayError as error:
+            if self._delayed > WAITING:
+                raise BlockedError(f"{name} is blocked: {error}") from error
+            return None
+        self._delayed = 0
+        return list(way)
+
+    def _is_free(self, goal: Floats, scene: Scene) -> bool:
+        """Return whether the robot is not inside itself with the arm at a goal."""
+        qpos = scene.qpos(self._owner)
+        qpos[self._own] = goal
+        overlaps = self._alone.overlaps({self._owner: qpos})
+        return not any(o.one.robot == o.other.robot == self._owner for o in overlaps)
+
+    def _reaching(self, place: Floats, scene: Scene) -> list[Floats]:
+        """Return arm joints that bring the TCP to a place.
+
+        They are sought from the present ones, and from those turned towards the place by the
+        first joint, which turns an arm about its base.
+        """
+        arm, tip = self._reach.arm(scene.qpos(self._robot)), scene.tcp(self._robot)[0]
+        origin, turned = self._reach.forward(arm)
+        point = rotate(inverse(turned), tip - origin)
+        about = remainder(heading(self._base, place) - heading(self._base, tip), 2 * pi)
+        starts = [arm + about * side * (np.arange(len(arm)) == 0) for side in (0, 1, -1)]
+        goals = [self._reach.solve(point, place, start) for start in starts]
+        return [goal for goal in goals if goal is not None]

@@ -1,0 +1,49 @@
+"""Bringing a tool centre point to a place, turned in any way that suits the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import pi
+from typing import Any
+
+from robot_layouts.experts.geometry import gripper_facing, heading
+from robot_layouts.experts.script import Pose, Scene, Waypoint
+from robot_layouts.kinematics.rotations import Floats
+from tasks import TaskEnv
+
+POSE_JOINTS = 6  # of an arm that can choose how its TCP is turned
+LEANS = (0.0, pi / 6, pi / 3, pi / 2, -pi / 6)  # from straight down (rad)
+
+
+def reaching(
+    task: TaskEnv,
+    robot: str,
+    name: str,
+    place: Callable[[Scene], Floats],
+    *,
+    leans: Sequence[float] = LEANS,
+    as_it_is: bool = True,
+    **others: Any,
+) -> Waypoint:
+    """Return the waypoint that brings a robot's TCP to a place, turned in the quickest way.
+
+    Args:
+        task: Says which robot it is.
+        robot: Its place in the layout.
+        name: What the waypoint is called.
+        place: Where the TCP should be, (3,) (m, world), given the scene.
+        leans: How far the gripper may lean from straight down, away from its base (rad).
+        as_it_is: Whether it may also stay turned as it is.
+        **others: Other fields of `robot_layouts.experts.script.Waypoint`.
+    """
+    arm = task.layout.arm(robot).robot
+    if len(arm.arm_joints) < POSE_JOINTS or arm.tcp_position_links:
+        return Waypoint(name, at=place, **others)
+
+    def poses(scene: Scene) -> list[Pose]:
+        point = place(scene)
+        ahead = heading(scene.base(robot), point)
+        own = [(point, scene.tcp(robot)[1])] if as_it_is else []
+        return [*own, *((point, gripper_facing(ahead, lean)) for lean in leans)]
+
+    return Waypoint(name, to=poses, **others)

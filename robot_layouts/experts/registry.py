@@ -1,0 +1,100 @@
+"""Which tasks have an expert, by task id."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_layouts.core.bounds import shown
+from robot_layouts.core.catalogue import Catalogue
+from robots import TaskError
+from tasks import TaskEnv, get_task_class
+
+Expert = Callable[[TaskEnv, int], NDArray[np.float32]]
+"""``expert(task, seed)`` returns actions (T, A) for the episode that ``seed`` begins.
+
+The task says which layout and physics to plan for and is itself left alone: experts plan in worlds
+of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfigure": True})``.
+"""
+
+# One line per task, sorted by id: id -> module:function.
+CATALOGUE = {
+    "DrawTriangle-v1": "robot_layouts.experts.maniskill.draw_triangle:draw_outline",
+    "FourRobotStack-v1": "robot_layouts.experts.originals.four_robot_stack:stack_for_four",
+    "LiftPegUpright-v1": "robot_layouts.experts.maniskill.lift_peg_upright:stand_up",
+    "PegInsertionSide-v1": "robot_layouts.experts.maniskill.peg_insertion_side:insert_peg",
+    "PickCube-v1": "robot_layouts.experts.maniskill.pick_cube:pick_cube",
+    "PickCubeSO100-v1": "robot_layouts.experts.maniskill.pick_cube_so100:pick_small_cube",
+    "PlaceSphere-v1": "robot_layouts.experts.maniskill.place_sphere:place_sphere",
+    "PlugCharger-v1": "robot_layouts.experts.maniskill.plug_charger:plug_in",
+    "PokeCube-v1": "robot_layouts.experts.maniskill.poke_cube:poke",
+    "PullCube-v1": "robot_layouts.experts.maniskill.slide_cube:slide",
+    "PullCubeTool-v1": "robot_layouts.experts.maniskill.pull_cube_tool:pull",
+    "PushCube-v1": "robot_layouts.experts.maniskill.slide_cube:slide",
+    "PushT-v1": "robot_layouts.experts.maniskill.push_t:push_onto_outline",
+    "Relay-v1": "robot_layouts.experts.originals.relay:pass_on",
+    "RollBall-v1": "robot_layouts.experts.maniskill.roll_ball:roll",
+    "StackCube-v1": "robot_layouts.experts.maniskill.stack_cube:stack_cube",
+    "StackPyramid-v1": "robot_layouts.experts.maniskill.stack_pyramid:stack_pyramid",
+    "TwoRobotLiftBar-v1": "robot_layouts.experts.originals.two_robot_lift_bar:lift_for_two",
+    "TwoRobotPickCube-v1": "robot_layouts.experts.maniskill.two_robot_pick_cube:hand_over",
+    "TwoRobotPushPick-v1": "robot_layouts.experts.originals.two_robot_push_pick:push_and_pick",
+    "TwoRobotStackCube-v1": "robot_layouts.experts.maniskill.two_robot_stack_cube:stack_for_two",
+}
+
+
+def _check(given: object, origin: str, name: str) -> Expert:
+    """Return what an entry point gave, if it can be an expert."""
+    if not callable(given):
+        raise TaskError(
+            f"{origin} gave {shown(given)}; the expert of {name} is needed, a function of a task"
+            " and a seed"
+        )
+    return cast(Expert, given)
+
+
+EXPERTS = Catalogue(
+    "expert",
+    CATALOGUE,
+    group="robot_layouts.experts",
+    check=_check,
+    error=TaskError,
+    ignore_case=True,
+)
+
+
+def register_expert(task_id: str, expert: Expert) -> Expert:
+    """Make an expert known for a task, in place of the present one if there is one.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+    """
+    EXPERTS.register(get_task_class(task_id).task_id, expert)
+    return expert
+
+
+def find_expert(task_id: str) -> Expert:
+    """Return the expert of a task.
+
+    Other packages bring experts through the entry points ``robot_layouts.experts``, named as the
+    tasks that they solve.
+
+    Args:
+        task_id: The task's id or another of its names.
+
+    Raises:
+        UnknownNameError: If there is no such task.
+        TaskError: If the task has no expert, or another package brings it and that goes wrong.
+    """
+    name = get_task_class(task_id).task_id
+    if name not in EXPERTS:
+        raise TaskError(f"{name} has no expert yet; tasks with one: {', '.join(list_experts())}")
+    return EXPERTS[name]
+
+
+def list_experts() -> tuple[str, ...]:
+    """Return the ids of all tasks that have an expert, sorted."""
+    return tuple(EXPERTS)

@@ -1,0 +1,107 @@
+"""Scripts as data: waypoints for each robot, and what a script sees of a world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_layouts.experts.tips import gripper_turn
+from robot_layouts.kinematics.rotations import Floats, multiply
+from robot_layouts.simulation import State
+from robot_layouts.simulation.world import Body
+from tasks import TaskEnv
+
+OPEN, CLOSED = 1.0, -1.0
+
+Pose = tuple[Floats, Floats]  # position (m) and quaternion wxyz, world
+
+
+class Scene:
+    """What a script sees of one world, as numpy arrays in the world frame.
+
+    Attributes:
+        design: Geometry that the task drew for this episode, if it draws any.
+        bodies: What the task put into the world, as declared.
+    """
+
+    def __init__(self, task: TaskEnv) -> None:
+        """Look at the first world of a task as it is now."""
+        self._state: State = task.simulation.read()
+        self._layout = task.standing()
+        world = task.simulation.worlds[0]
+        self.design: Any = world.design
+        self.bodies: tuple[Body, ...] = tuple(world.bodies.values())
+
+    def body(self, name: str) -> Pose:
+        """Return the pose of a body."""
+        return _split(self._state.pose(name)[0])
+
+    def scale(self, name: str) -> float:
+        """Return how much larger a body is in this episode than it was declared, as a factor."""
+        return next(body.scale for body in self.bodies if body.name == name)
+
+    def base(self, robot: str) -> Floats:
+        """Return where the base of a robot or a limb stands, (3,)."""
+        return np.array(self._layout.arm(robot).base_position)
+
+    def tcp(self, robot: str) -> Pose:
+        """Return the pose of a robot's tool centre point.
+
+        Its z axis is the gripper's approach and its y axis the way the fingers open, if the robot's
+        TCP link has them so, as a Panda's; where the TCP is the mean of several links, always.
+        """
+        position, quaternion = _split(self._state.tcp_pose(robot)[0])
+        turned = gripper_turn(self._layout.arm(robot).robot)
+        return position, quaternion if turned is None else multiply(quaternion, turned)
+
+    def qpos(self, robot: str) -> Floats:
+        """Return all joints of a robot in its descriptor's order, shape (dof,) (rad, m)."""
+        return self._state.qpos(robot)[0].astype(float)
+
+    def grasps(self, robot: str, body: str) -> bool:
+        """Return whether a robot's fingers hold a body."""
+        return bool(self._state.is_grasping(robot, body)[0])
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """One thing that one robot does.
+
+    Attributes:
+        name: What it is called in the script of its robot.
+        to: Poses of the TCP, worked out from the scene when the waypoint begins; of those in
+            reach the one with the shortest way there is taken. Without it and ``turn`` it stays.
+        gripper: Action number of the gripper meanwhile, `OPEN` … `CLOSED`.
+        after: Waypoints of other robots, ``"robot.name"``, that must be done before it begins;
+            until then the robot keeps the previous one.
+        near: Arm joints count as arrived when all are this near (rad).
+        steps: Least number of control steps it takes.
+        until: What else must hold for it to be done.
+        turn: Instead of ``to``, how far the arm's joints turn, (arm joints,) (rad), worked out from
+            where they are when the waypoint begins; both in the order of the robot's arm joints.
+        most: Number of control steps after which, if it is not done, the script has failed.
+        at: Instead of ``to``, where the TCP should be, (3,) (m, world), turned in any way: for arms
+            of too few joints to choose that too.
+    """
+
+    name: str
+    to: Callable[[Scene], Sequence[Pose]] | None = None
+    gripper: float = OPEN
+    after: tuple[str, ...] = ()
+    near: float = 0.05
+    steps: int = 0
+    until: Callable[[Scene], bool] | None = None
+    turn: Callable[[Floats], Floats] | None = None
+    most: int | None = None
+    at: Callable[[Scene], Floats] | None = None
+
+
+Script = Mapping[str, Sequence[Waypoint]]
+
+
+def _split(row: NDArray[np.float32]) -> Pose:
+    return row[:3].astype(float), row[3:].astype(float)

@@ -1,0 +1,123 @@
+"""What pictures and pages of a motion show: bodies, ways of TCPs, distances and speeds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from layouts.layout import Layout
+from robot_layouts.kinematics.rotations import Floats, transform
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.collision.checker import Checker
+from robot_layouts.motion.model.bodies import Solid
+from robot_layouts.motion.model.obstacles import Held
+from robot_layouts.motion.output.protocol import TimedMotion
+from robot_layouts.motion.timing import velocities
+from robots.urdf.tcp import find_tcp
+
+
+@dataclass(frozen=True, eq=False)
+class Distances:
+    """What comes how near over time.
+
+    Attributes:
+        times: (n,) (s).
+        least: Least distance of a robot from another or an obstacle, (n,) (m); NaN if all is far.
+        nearest: The two bodies that come nearest of all, by name; empty if none do.
+    """
+
+    times: Floats
+    least: Floats
+    nearest: tuple[str, ...]
+
+
+class Scenes:
+    """A motion with all bodies of its cell."""
+
+    def __init__(self, motion: TimedMotion) -> None:
+        """Read the robots' files.
+
+        Raises:
+            AssetError: If they cannot be found or make no sense.
+            MissingPackageError: If trimesh or python-fcl is not installed.
+        """
+        self.motion = motion
+        self.cell = Cell(motion.layout, motion.obstacles, motion.held, motion.table)
+
+    def states(self, times: Floats) -> Floats:
+        """Return the joints of all robots at some times, (n, D) (rad, m)."""
+        sampled = self.motion.sample(times)
+        return np.concatenate([sampled[name] for name in self.cell.robots], axis=1)
+
+    def standing(self) -> list[Solid]:
+        """Return tables, and obstacles that do not move."""
+        return [solid for solid in self.cell.solids if _stands(self.cell, solid)]
+
+    def moving(self, time: float) -> list[tuple[Solid, Floats]]:
+        """Return all other bodies at a time, with their corners, (n, 3) (m, world)."""
+        cell, moments = self.cell, np.array([time])
+        links = cell.poses(self.states(moments))[0]
+        at = {link: links[i] for i, link in enumerate(cell.links)}
+        found: list[tuple[Solid, Floats]] = []
+        for solid in cell.solids:
+            part, pose = cell.parts[solid.part], np.eye(4)
+            if part.track is not None:
+                pose = part.track.at(moments)[0]
+            elif part.robot:
+                pose = at[part.robot, cell.models[part.robot].kinematics.links[part.link]]
+            if not _stands(cell, solid):
+                found.append((solid, transform(pose @ solid.offset, solid.hull.corners)))
+        return found
+
+    def held_poses(self, held: Held, times: Floats) -> Floats:
+        """Return where a body that an arm carries is at some times, (n, 4, 4) (m, world)."""
+        robot, link = self.cell.tcp(held.place)
+        at = self.cell.links.index((robot, self.cell.models[robot].kinematics.links[link]))
+        return self.cell.poses(self.states(times))[:, at] @ held.obstacle.poses(None, len(times))
+
+    def tcp_ways(self, times: Floats) -> dict[str, Floats]:
+        """Return where the TCP of each arm is at some times, (n, 3) (m, world)."""
+        poses = self.cell.poses(self.states(times))
+        ways: dict[str, Floats] = {}
+        for arm, placement in self.motion.layout.arms.items():
+            owner = self.motion.layout.owner(arm)
+            own = [i for i, (robot, _) in enumerate(self.cell.links) if robot == owner]
+            tcp = find_tcp(placement.robot, self.cell.models[owner].kinematics)
+            ways[arm] = tcp.places(poses[:, own])
+        return ways
+
+    def distances(self, times: Floats) -> Distances:
+        """Return how near robots come to each other and to what stands around."""
+        solids, whole = self.cell.solids, self.cell.checker()
+        apart = [solids[a].owner != solids[b].owner for a, b in whole.pairs.tolist()]
+        checker = Checker(self.cell, whole.pairs[np.array(apart, bool)], 0.0)
+        contacts = [
+            checker.nearest(state, time)
+            for state, time in zip(self.states(times), times.tolist(), strict=True)
+        ]
+        least = np.array([np.nan if c is None else c.distance for c in contacts])
+        if np.isnan(least).all():
+            return Distances(times, least, ())
+        contact = contacts[int(np.nanargmin(least))]
+        return Distances(times, least, () if contact is None else tuple(contact.names))
+
+    def speeds(self, times: Floats) -> dict[str, Floats]:
+        """Return by robot the largest share that a joint uses of its largest velocity, (n,)."""
+        fastest = largest_velocities(self.motion, self.motion.layout)
+        return {
+            name: (np.abs(rows) / fastest[name]).max(axis=1)
+            for name, rows in self.motion.velocity(times).items()
+        }
+
+
+def _stands(cell: Cell, solid: Solid) -> bool:
+    return not solid.mover and cell.parts[solid.part].track is None
+
+
+def largest_velocities(motion: TimedMotion, layout: Layout) -> dict[str, Floats]:
+    """Return how fast each robot's joints may move, (dof,) (rad/s, m/s)."""
+    return {
+        **velocities.largest_velocities(layout, "pd_joint_pos"),
+        **motion.largest_velocities,
+    }

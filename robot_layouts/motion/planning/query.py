@@ -1,0 +1,191 @@
+"""One planning query: from a start to goals, past obstacles as they are at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from robot_layouts.core.errors import NoPlanError
+from robot_layouts.core.progress import Progress
+from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.motion.collision.cell import Cell
+from robot_layouts.motion.collision.clearances import Clearances
+from robot_layouts.motion.planning.goal_configurations import find_goal_configurations
+from robot_layouts.motion.planning.goals import Target, different
+from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs
+from robot_layouts.motion.planning.prioritized import coordinated
+from robot_layouts.motion.planning.rrt_connect import connect
+from robot_layouts.motion.planning.shortcuts import rounded, shortened
+from robot_layouts.motion.planning.space import Resolution, Space
+from robot_layouts.motion.timing.paths import Path
+from robot_layouts.motion.timing.trajectories import CellTrajectory
+
+FEW = 4  # robots that plan together at first
+RESTARTS = 4  # searches of all robots together
+FINEST, COARSEST = 2e-3, 0.01  # m; between places that are checked: the clearance, if within
+RADIANS_PER_METRE = 5.0  # how far links may turn between two of them, beside how far they travel
+
+
+@dataclass(eq=False)
+class Query:
+    """What is asked, with everything that it takes to answer it.
+
+    Attributes:
+        cell: The cell.
+        start: Where all coordinates are at the start, (D,) (rad, m).
+        targets: What each place is to do.
+        dynamic_obstacles: What moves along known trajectories.
+        clearances: Who keeps how far from what.
+        speeds: Largest speeds of all coordinates, (D,) (rad/s, m/s).
+        clearance: How far robots keep from everything (m).
+        seed: Of everything random.
+        progress: What counts the checks.
+    """
+
+    cell: Cell
+    start: Floats
+    targets: tuple[Target, ...]
+    dynamic_obstacles: CellTrajectory
+    clearances: Clearances
+    speeds: Floats
+    clearance: float
+    seed: int
+    progress: Progress
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots that move, in the layout's order."""
+        moving = {target.robot for target in self.targets}
+        return tuple(name for name in self.cell.robots if name in moving)
+
+    @property
+    def resolution(self) -> Resolution:
+        """How dense checks make sure that nothing comes nearer than 0 in between."""
+        step = min(max(self.clearance, FINEST), COARSEST)
+        return step, RADIANS_PER_METRE * step
+
+    def ends(self) -> Floats:
+        """Return all coordinates at some combinations of goals, best first, (n, D).
+
+        Those that keep the clearance come first. For bodies that are nearer at the start or at
+        the first of them the clearance is given up.
+
+        Raises:
+            NoPlanError: If the start collides, or all goals do.
+        """
+        self.clearances.expect_free_start(self.start)
+        self.clearances.relax(self.start)
+        end = self.dynamic_obstacles.end
+        ends = find_goal_configurations(
+            self.targets, self.clearances, self.dynamic_obstacles.positions(end), end
+        )
+        self.clearances.relax(ends[0], self.dynamic_obstacles.end)
+        return ends
+
+    def reachable_ends(self) -> Floats:
+        """Return what `ends` does, of postures that are not known to be cut off from the start.
+
+        Raises:
+            NoPlanError: If there are none; all of a goal are cut off, or all others collide.
+        """
+        end = self.dynamic_obstacles.end
+        ends = find_goal_configurations(
+            [self._reachable(target) for target in self.targets],
+            self.clearances,
+            self.dynamic_obstacles.positions(end),
+            end,
+        )
+        self.clearances.relax(ends[0], end)
+        return ends
+
+    def _reachable(self, target: Target) -> Target:
+        """Return a target without the postures that are cut off.
+
+        Raises:
+            NoPlanError: If all are.
+        """
+        postures = different(np.concatenate([target.candidates, target.others()]))
+        goals = np.tile(self.start, (len(postures), 1))
+        goals[:, target.moving] = postures
+        proofs = list(map(self.proofs.before, goals))
+        kept = [proof is None for proof in proofs]
+        if proofs[0] is not None and not any(kept):
+            raise proofs[0].refusal()
+        none = np.empty((0, len(target.moving)))
+        return replace(target, candidates=postures[kept], others=lambda: none)
+
+    @cached_property
+    def proofs(self) -> InfeasibilityProofs:
+        """What may cut goals off from the start."""
+        moving = np.concatenate([target.moving for target in self.targets])
+        return InfeasibilityProofs(self.cell, self.clearances.standing, self.start, moving)
+
+    def path(
+        self, ends: Floats, when: float | None = None, robots: Collection[str] | None = None
+    ) -> tuple[Space, Path]:
+        """Return the space of all coordinates that move, and the way through it.
+
+        Args:
+            ends: What `ends` returned.
+            when: The moment at which dynamic obstacles are taken to stand still (s); None ignores
+                them.
+            robots: Those that are to move, as if the others that have a goal were not there; None
+                is all.
+
+        Raises:
+            NoPlanError: If there is none, or the time given is over.
+        """
+        chosen = self.robots if robots is None else tuple(r for r in self.robots if r in robots)
+        ignored = [name for name in self.robots if name not in chosen]
+        moving = np.sort(np.concatenate([t.moving for t in self.targets if t.robot in chosen]))
+        base = self.start if when is None else self.dynamic_obstacles.positions(when)
+        space = Space(
+            self.cell,
+            chosen,
+            moving,
+            base,
+            _bounds(self.cell.limits[moving], self.start[moving], ends[:, moving]),
+            self.speeds[moving],
+            self.clearances.checker(chosen, ignored, timed=when is not None),
+            self.progress,
+            when=when,
+            proofs=self.proofs,
+        )
+        free = space.are_free(ends[:, moving])
+        points = self._points(space, list(ends[free][:, moving])) if free.any() else None
+        if points is None:
+            raise self._not_found(chosen)
+        space.purpose = "shortening"
+        points = shortened(space, points, self.seed, self.resolution)
+        return space, rounded(space, points, self.resolution)
+
+    def _points(self, space: Space, goals: Sequence[Floats]) -> Floats | None:
+        """Return points of a free path: few robots plan together, many alone at first."""
+        start = self.start[space.free]
+        together = partial(connect, space, start, goals, self.seed, self.resolution)
+        few = len(space.robots) <= FEW
+        points = together(restarts=int(few))
+        if points is None and len(space.robots) > 1:
+            points = coordinated(
+                space, self.clearances, start, goals[0], self.seed, self.resolution
+            )
+        return together(first=int(few), restarts=RESTARTS) if points is None else points
+
+    def _not_found(self, robots: Collection[str]) -> NoPlanError:
+        who = ", ".join(target.place for target in self.targets if target.robot in robots)
+        return NoPlanError(
+            f"no motion of {who} was found in {self.progress.told} checks; another seed, a"
+            " smaller clearance or another posture at the goal may help",
+            "not found",
+        )
+
+
+def _bounds(limits: Floats, start: Floats, ends: Floats) -> Floats:
+    """Return where a search may go: the limits, or around start and goals where there are none."""
+    around = np.concatenate([start[None], ends])
+    low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], around.min(axis=0) - np.pi)
+    high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], around.max(axis=0) + np.pi)
+    return np.stack([low, high], axis=1)

@@ -1,0 +1,42 @@
+"""Worlds of a layout's robots plus objects: physics settings, control, contacts, pictures.
+
+The only room that imports sapien, which lives in `sapien3`, below the seam that
+`robot_layouts.simulation.backend` describes.
+"""
+
+from robot_layouts.core.own_packages import expect_own
+
+expect_own("robots", "layouts")
+
+from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
+from robot_layouts.simulation.sapien3.plain_scene import build_scene
+from robot_layouts.simulation.scene.cameras import Camera
+from robot_layouts.simulation.scene.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
+from robot_layouts.simulation.simulation import Simulation
+from robot_layouts.simulation.state import State
+from robot_layouts.simulation.tabletop import add_table
+from robot_layouts.simulation.world import World
+
+__all__ = [
+    "SAPIEN_DEFAULTS",
+    "Box",
+    "Camera",
+    "Capsule",
+    "Cylinder",
+    "Friction",
+    "Mesh",
+    "PhysicsSettings",
+    "Plane",
+    "Shape",
+    "Simulation",
+    "Sphere",
+    "State",
+    "World",
+    "add_table",
+    "build_scene",
+]
+
+
+def __dir__() -> list[str]:
+    """List what is public: `help` and completion go by this."""
+    return __all__

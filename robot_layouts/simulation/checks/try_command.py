@@ -1,0 +1,124 @@
+"""``robot-layouts robots inspect``, whose ``--try`` prints how a robot stands and moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated
+
+from robot_layouts.core.cli import Word
+from robot_layouts.simulation.checks.trial import (
+    HELD,
+    Fastest,
+    NumberTrial,
+    Trial,
+    in_itself,
+    percent,
+    try_robot,
+)
+from robots import inspect as reports
+from robots.named import FORMS, named_robot
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+STEPS = 50  # random ones
+MOST_OVERLAPS = 4  # that are shown
+WIDTH = 120  # characters of a table, at least
+
+
+def inspect(
+    robots: Sequence[Annotated[str, Word("ROBOT", about=FORMS)]], *, try_: bool = False
+) -> int:
+    """Print everything about robots, or try them in physics.
+
+    Exit code: 0, or 1 if a robot that is tried does not work, or 2 for bad usage.
+
+    Args:
+        robots: The robots.
+        try_: Stand the robots, step them and move them in physics, and print what was seen.
+
+    Raises:
+        RobotLayoutsError: If a robot does not exist, or cannot be read or built.
+    """
+    if not try_:
+        reports.inspect(robots)
+        return 0
+    from rich.console import Console
+
+    console = Console(markup=False, highlight=False, soft_wrap=True)
+    console.width = max(console.width, WIDTH)
+    trials: list[Trial] = []
+    for robot in [named_robot(name) for name in robots]:
+        trials.append(try_robot(robot, STEPS))
+        _print(trials[-1], console)
+    return 1 if any(trial.problems for trial in trials) else 0
+
+
+def _print(trial: Trial, console: Console) -> None:
+    console.print(f"{trial.robot.name}: {trial.robot.summary}")
+    for line in _lines(trial):
+        console.print(f"  {line}")
+    console.print(_numbers(trial))
+    if not trial.problems:
+        console.print("  It stands and moves as it should.")
+    for problem in trial.problems:
+        console.print(f"  WRONG: {problem}")
+    console.print()
+
+
+def _lines(trial: Trial) -> Iterator[str]:
+    yield f"at the start    {_overlaps(trial)}"
+    joint, amount = trial.first_step
+    yield f"first step      holding still, {joint} moves most: {_amount(trial, joint, amount)}"
+    joint, amount = trial.after_hold
+    yield f"after {HELD} steps  {joint} is fastest: {_amount(trial, joint, amount)}/s"
+    yield f"random actions  {trial.steps} steps; fastest {_speed(trial, trial.fastest)}"
+    yield f"TCP             {trial.robot.tcp_link}, moved by up to {trial.tcp_way * 1e3:.3g} mm"
+
+
+def _overlaps(trial: Trial) -> str:
+    shown = [in_itself(overlap) for overlap in trial.overlaps[:MOST_OVERLAPS]]
+    if more := len(trial.overlaps) - len(shown):
+        shown.append(f"and {more} pairs of links more")
+    return "; ".join(shown) or "no links are inside each other"
+
+
+def _speed(trial: Trial, fastest: Fastest) -> str:
+    joint, speed, limit, step = fastest
+    return (
+        f"{joint}: {_amount(trial, joint, speed)}/s in step {step}, {fastest.times:.2g} times"
+        f" the {_amount(trial, joint, limit)}/s taken as its limit"
+    )
+
+
+def _amount(trial: Trial, joint: str, amount: float) -> str:
+    return f"{amount:.3g} {trial.unit(joint)}"
+
+
+def _numbers(trial: Trial) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    rows = Table(box=box.SIMPLE_HEAD)
+    rows.add_column("number", no_wrap=True)
+    rows.add_column("asks for", justify="right", no_wrap=True)
+    rows.add_column("moves", justify="right", no_wrap=True)
+    rows.add_column("of the others", no_wrap=True)
+    rows.add_column("")
+    for number in trial.numbers:
+        rows.add_row(*_row(number))
+    return rows
+
+
+def _row(trial: NumberTrial) -> tuple[str, ...]:
+    other = "–"
+    if trial.other is not None:
+        other = f"{trial.other.joint} {percent(trial.other.amount)}"
+    return (
+        trial.number.name,
+        f"{trial.asked:.3g} {trial.number.unit.removesuffix('/s')}",
+        percent(trial.least.amount),
+        other,
+        "WRONG" if trial.problem else "",
+    )

@@ -1,0 +1,97 @@
+"""Joint-position control, generated from the robots' action splits.
+
+What control modes ask for besides is in `robot_layouts.simulation.control`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from layouts import Layout
+from robot_layouts.simulation.maths import Floats
+from robots import JointGroup
+
+
+class JointPositionController:
+    """Turns flat actions into drive targets for every joint of every robot.
+
+    All arithmetic is float32, as in native: float64 targets differ after one step.
+
+    Attributes:
+        action_dim: Number of action numbers A of all robots together.
+        dof: Number of their joints.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        """Lay out the robots' action numbers and joints, one robot after the other."""
+        self.action_dim = layout.action_dim
+        ranges: list[tuple[float, float]] = []  # of each action number
+        clipped: list[float] = []  # where each action number is clipped
+        drives: list[_Drive] = []  # of each driven joint
+        for placement in layout.values():
+            start = iter(placement.start_qpos)
+            for group in placement.robot.action_split.groups.values():
+                drives.extend(_drives(group, len(ranges), [next(start) for _ in group.joints]))
+                # One that is not normalised is its own target: 0 + 1 · number.
+                ranges.extend(group.ranges if group.normalised else [(-1.0, 1.0)] * group.size)
+                clipped.extend([1.0 if group.normalised else np.inf] * group.size)
+        self.dof = len(drives)
+        low, high = np.array(ranges, np.float32).T
+        half = np.float32(0.5)
+        self._highest: Floats = np.array(clipped, np.float32)
+        self._lowest: Floats = -self._highest
+        sources = [drive.source for drive in drives]
+        self._source = np.array(sources) % self.action_dim  # of what is held, any will do
+        self._one_to_one = sources == list(range(len(ranges)))
+        multipliers, offsets = np.array([drive[1:3] for drive in drives], np.float32).T
+        self._centre: Floats = multipliers * (half * (high + low))[self._source] + offsets
+        self._half_range: Floats = multipliers * (half * (high - low))[self._source]
+        self._relative: Floats = np.array([drive.relative for drive in drives], np.float32)
+
+    def targets(self, action: Floats, qpos: Floats) -> Floats:
+        """Return the drive targets of a batch of actions.
+
+        Args:
+            action: Shape (N, A); normalised numbers are clipped to [-1, 1].
+            qpos: Current joint positions of all robots, those of each in the order of its
+                descriptor, shape (N, dof) (rad, m).
+
+        Returns:
+            Shape (N, dof) (rad, m).
+        """
+        clipped = np.minimum(np.maximum(action, self._lowest), self._highest)
+        driving = clipped if self._one_to_one else clipped.take(self._source, 1)
+        target: Floats = self._centre + self._half_range * driving
+        target += qpos * self._relative
+        return target
+
+
+class _Drive(NamedTuple):
+    """How one joint follows the action: multiplier · mapped number + offset, or relative to it."""
+
+    source: int
+    multiplier: float
+    offset: float
+    relative: bool
+
+
+def _drives(group: JointGroup, first: int, start: Sequence[float]) -> Iterator[_Drive]:
+    """Yield how each joint of a group is driven.
+
+    Args:
+        group: The group.
+        first: The first of its action numbers.
+        start: Where its joints start (rad, m).
+    """
+    for i, (multiplier, offset) in enumerate(group.followers):
+        if group.held:
+            yield _Drive(first, 0.0, start[i], relative=False)
+        elif not group.asks.positions:
+            yield _Drive(first, 0.0, 0.0, relative=True)  # stays where it is
+        else:
+            source = first if group.mimic else first + i
+            shift = 0.0 if group.delta else offset
+            yield _Drive(source, multiplier, shift, group.delta)

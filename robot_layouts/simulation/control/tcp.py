@@ -1,0 +1,226 @@
+"""TCP control: from action numbers to the pose of a tool centre point, and on to joint targets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from robot_layouts.kinematics.quaternions import inverted, multiplied
+from robot_layouts.simulation.backend import Backend, PoseFollower
+from robot_layouts.simulation.maths import Floats, cos, norm, sin, sqrt
+from robot_layouts.simulation.readout import ReadoutIndex
+from robot_layouts.simulation.state import State
+from robots import JointGroup
+
+Number = np.float32
+Row = tuple[Number, ...]
+
+_ONE, _TWO = np.float32(1), np.float32(2)
+_NOTHING = np.float32(0)
+_LEAST_ROOT = np.float32(0.1)
+
+
+def row(numbers: Iterable[Any]) -> Row:
+    """Return numbers of a float32 array one by one."""
+    return tuple(numbers)
+
+
+def upright(quaternion: Row) -> Row:
+    """Return a quaternion with w ≥ 0."""
+    w, x, y, z = quaternion
+    return (-w, -x, -y, -z) if w < _NOTHING else quaternion
+
+
+def turned(quaternion: Row, point: Row) -> Row:
+    """Return a point, three numbers, turned by a quaternion."""
+    return multiplied(multiplied(quaternion, (_NOTHING, *point)), inverted(quaternion))[1:]
+
+
+def added(one: Row, other: Row) -> Row:
+    """Return the sum of two points."""
+    return one[0] + other[0], one[1] + other[1], one[2] + other[2]
+
+
+def inverse(pose: Row) -> Row:
+    """Return the inverse of a pose."""
+    x, y, z, *quaternion = pose
+    back = inverted((*quaternion,))
+    return *turned(back, (-x, -y, -z)), *back
+
+
+def combined(first: Row, second: Row) -> Row:
+    """Return ``first · second``: the pose ``second`` of what is seen from ``first``."""
+    place = added(first[:3], turned(first[3:], second[:3]))
+    return *place, *upright(multiplied(first[3:], second[3:]))
+
+
+def rotation(angles: Floats) -> Row:
+    """Return the quaternion, w ≥ 0, of turns about x, then the new y, then the new z, (3,)."""
+    cx, cy, cz = cos(angles)
+    sx, sy, sz = sin(angles)
+    both, other = sx * sy, cx * sy
+    return quaternion(
+        (cy * cz, -cy * sz, sy),
+        (both * cz + cx * sz, both * -sz + cx * cz, -sx * cy),
+        (-other * cz + sx * sz, -other * -sz + sx * cz, cx * cy),
+    )
+
+
+def quaternion(first: Row, second: Row, third: Row) -> Row:
+    """Return the quaternion, w ≥ 0, of the three rows of a rotation matrix.
+
+    Of the four ways to read it off, the one that divides by the largest number.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = first, second, third
+    squares = np.array(
+        [
+            _ONE + xx + yy + zz,
+            _ONE + xx - yy - zz,
+            _ONE - xx + yy - zz,
+            _ONE - xx - yy + zz,
+        ]
+    )
+    roots = sqrt(np.maximum(squares, _NOTHING))
+    largest = int(roots.argmax())
+    root = roots[largest]
+    found = (
+        (root * root, zy - yz, xz - zx, yx - xy),
+        (zy - yz, root * root, yx + xy, xz + zx),
+        (xz - zx, yx + xy, root * root, zy + yz),
+        (yx - xy, zx + xz, zy + yz, root * root),
+    )[largest]
+    divisor = _TWO * max(root, _LEAST_ROOT)
+    return upright(tuple(number / divisor for number in found))
+
+
+def clipped_turn(angles: Floats) -> Floats:
+    """Return angles, (3,), scaled down to a norm of 1 if theirs is above."""
+    length = norm(angles[None])[0]
+    return angles * (_ONE / length) if length > _ONE else angles
+
+
+class Tool(NamedTuple):
+    """A joint group whose action numbers ask for a TCP.
+
+    Attributes:
+        robot: Name of the robot in the layout.
+        arm: Name of the robot or the limb whose TCP it is.
+        group: What drives it.
+        tcp_link: Link that orients the TCP.
+        numbers: Where its action numbers are in the flat action.
+        joints: Where its joints are among those of all robots.
+        own: Where the robot's joints are among those of all robots.
+    """
+
+    robot: str
+    arm: str
+    group: JointGroup
+    tcp_link: str
+    numbers: slice
+    joints: slice
+    own: slice
+
+
+class ToolControl:
+    """Drives a joint group by the pose of its TCP, in every world.
+
+    Attributes:
+        tool: The joint group.
+        targets: Where the TCP was last asked to be in its root link's frame, (N, 7).
+    """
+
+    def __init__(self, tool: Tool) -> None:
+        """Take what is driven."""
+        self.tool, group = tool, tool.group
+        start = tool.numbers.start
+        self._place, self._angles = slice(start, start + 3), slice(start + 3, start + 6)
+        moves, turns = group.frame.split(":")
+        self._by_root, self._turns_by_root = moves.startswith("root"), turns.startswith("root")
+        # Native scales a turn by its lower bound, so that 1 turns backwards.
+        self._turn_scale = np.float32(group.ranges[-1][0])
+        self._follower: PoseFollower | None = None
+        self._tcp_frame = self._link_frame = self._root_frame = 0
+        self._roots: dict[bytes, Row] = {}
+        self.targets: Floats = np.zeros((0, 7), np.float32)
+
+    def build(self, backend: Backend, index: ReadoutIndex) -> None:
+        """Find the frames, and what solves for joints."""
+        tool, links = self.tool, index.links[self.tool.robot]
+        root_link = tool.group.root_link
+        self._tcp_frame, self._link_frame = index.tcps[tool.arm], links[tool.tcp_link]
+        self._root_frame = index.bases[tool.robot] if root_link is None else links[root_link]
+        self._follower = backend.pose_follower(
+            tool.robot, tool.tcp_link, root_link, tool.group.joints
+        )
+
+    def begin(self, state: State, env_ids: Iterable[int]) -> None:
+        """Let the targets of some worlds be where the TCPs are."""
+        if len(self.targets) != state.num_envs:
+            self.targets = np.zeros((state.num_envs, 7), np.float32)
+        for env in env_ids:
+            self.targets[env] = self._now(state, env)
+
+    def drive(self, action: Floats, scaled: Floats, state: State, env: int, joints: Floats) -> None:
+        """Write the joint targets that bring the TCP where an action asks it to be.
+
+        They are left as they are if there are none.
+
+        Args:
+            action: Of one world, (A,).
+            scaled: The same, clipped and scaled to metres.
+            state: The worlds before the step.
+            env: Which world.
+            joints: Joint targets of that world, (dof,) (rad, m), which hold the present joints.
+        """
+        assert self._follower is not None
+        wanted = self._wanted(action, scaled, state, env)
+        if self.tool.group.target:
+            self.targets[env] = wanted
+        pose: Floats = np.array(self._of_link(wanted, state, env), np.float32)
+        qpos = state.joint_positions[env, self.tool.own]
+        found = self._follower.follow(pose[:3], pose[3:], qpos)
+        if found is not None:
+            joints[self.tool.joints] = found
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _wanted(self, action: Floats, scaled: Floats, state: State, env: int) -> Row:
+        """Return where the TCP is to be, in its root link's frame."""
+        group, place = self.tool.group, row(scaled[self._place])
+        turn = self._turn(action) if group.asks.turn else None
+        if not group.delta:
+            assert turn is not None
+            return *place, *turn
+        before = row(self.targets[env]) if group.target else self._now(state, env)
+        spot, way = before[:3], before[3:]
+        moved = place if self._by_root else turned(way, place)
+        if turn is not None:
+            way = multiplied(turn, way) if self._turns_by_root else multiplied(way, turn)
+        return *added(spot, moved), *upright(way)
+
+    def _turn(self, action: Floats) -> Row:
+        angles = action[self._angles]
+        if self.tool.group.normalised:
+            angles = clipped_turn(angles) * self._turn_scale
+        return rotation(angles)
+
+    def _now(self, state: State, env: int) -> Row:
+        """Return where the TCP is, in its root link's frame."""
+        root = state.all_poses[self._root_frame, env]
+        key = root.tobytes()
+        if key not in self._roots:  # roots seldom move
+            if len(self._roots) > state.num_envs:
+                self._roots.clear()
+            self._roots[key] = inverse(row(root))
+        return combined(self._roots[key], row(state.all_poses[self._tcp_frame, env]))
+
+    def _of_link(self, wanted: Row, state: State, env: int) -> Row:
+        """Return where the link that orients the TCP is, if the TCP is where it is wanted."""
+        if self._tcp_frame == self._link_frame:
+            return wanted
+        tcp, link = (
+            row(state.all_poses[frame, env]) for frame in (self._tcp_frame, self._link_frame)
+        )
+        return combined(wanted, combined(inverse(tcp), link))

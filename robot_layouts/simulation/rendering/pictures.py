@@ -1,0 +1,132 @@
+"""Pictures of worlds, and whether this machine can draw any."""
+
+from __future__ import annotations
+
+import functools
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, RobotCamera, Texture, View
+from robot_layouts.simulation.simulation import Simulation
+from robots import SimulationError
+from robots.descriptor import Vector3
+
+SIZE = 512  # pixels along each side of a picture for people
+FIELD_OF_VIEW = 1.0  # rad, vertical
+
+_PROBE = "import sapien; from sapien.render import RenderSystem; sapien.Scene([RenderSystem()])"
+_PROBE_SECONDS = 60
+
+
+class Cameras:
+    """One camera per world, all looking from the same place at the same point, for people.
+
+    Cameras and lights live in a scene of their own beside each world's, so that looking at a
+    world changes nothing in it.
+    """
+
+    def __init__(self, simulation: Simulation, eye: Vector3, target: Vector3) -> None:
+        """Set a camera up in every world.
+
+        Args:
+            simulation: Worlds that were built with visuals.
+            eye: Where the cameras are (m, world).
+            target: The point in the middle of the picture (m, world).
+
+        Raises:
+            SimulationError: If the worlds have no visuals, or ``eye`` and ``target`` coincide.
+        """
+        _expect_visuals(simulation)
+        self._simulation = simulation
+        self._view = Camera(eye, target, "view", SIZE, SIZE, FIELD_OF_VIEW)
+
+    def take(self) -> NDArray[np.uint8]:
+        """Return what every camera sees now, (N, 512, 512, 3).
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        pictures: list[Texture] = []
+        for env in range(self._simulation.num_envs):
+            (view,) = self._simulation.look(env, {"view": self._view}, ("rgb",), markers=True)
+            pictures.append(view.images["rgb"])
+        return np.stack(pictures).astype(np.uint8, copy=False)
+
+
+class Observers:
+    """The cameras that observe: in every world the same ones, which do not see its markers."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        cameras: Mapping[str, AnyCamera],
+        textures: Sequence[str],
+    ) -> None:
+        """Remember what to look with; cameras are set up when a world is first looked at.
+
+        Args:
+            simulation: Worlds that were built with visuals.
+            cameras: Camera by its name in observations.
+            textures: What to take, some of `robot_layouts.simulation.scene.cameras.TEXTURES`.
+
+        Raises:
+            SimulationError: If the worlds have no visuals.
+            UnknownNameError: If a robot has not the link that its camera rides on.
+        """
+        _expect_visuals(simulation)
+        self._simulation, self._cameras, self._textures = simulation, dict(cameras), tuple(textures)
+        for camera in self._cameras.values():
+            if isinstance(camera, RobotCamera):
+                simulation.index.links[camera.robot].expect(camera.mount.link)
+
+    def look(self, env: int) -> dict[str, View]:
+        """Return what every camera sees in one world now, by its name.
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        return self.begin(env)()
+
+    def begin(self, env: int) -> Callable[[], dict[str, View]]:
+        """Begin to draw one world, which may not move before the pictures are returned.
+
+        Returns:
+            What waits for them, and returns what `look` does.
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        finish = self._simulation.begin_look(env, self._cameras, self._textures, markers=False)
+        return lambda: dict(zip(self._cameras, finish(), strict=True))
+
+
+def _expect_visuals(simulation: Simulation) -> None:
+    if not all(world.visuals for world in simulation.worlds):
+        raise SimulationError("these worlds have nothing to draw; build them with visuals=True")
+
+
+@functools.cache
+def vulkan_problem() -> str | None:
+    """Say in a few words why no pictures can be drawn on this machine, or return None.
+
+    Tried once, in a process of its own, as some drivers end the process that asks them.
+    """
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROBE],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=_PROBE_SECONDS,
+        )
+    except subprocess.TimeoutExpired:
+        return f"the Vulkan driver did not answer within {_PROBE_SECONDS} s"
+    if done.returncode == 0:
+        return None
+    lines = done.stderr.strip().splitlines()
+    last = lines[-1] if lines else f"the process ended with code {done.returncode}"
+    return f"no usable Vulkan driver ({last})"

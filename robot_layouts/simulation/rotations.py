@@ -1,0 +1,85 @@
+"""Rotation matrices and angles of quaternions, with the operations of native's helpers.
+
+Their order decides the last bits of observations and rewards, so they stand apart from
+`robot_layouts.kinematics.rotations`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+
+from robot_layouts.simulation.maths import Floats, arctan2, number, sqrt
+
+# Products of quaternion entries (w = 0, x = 1, y = 2, z = 3) that each of the nine matrix entries,
+# row by row, is the sum or difference of.
+_PAIRS = (
+    (((2, 2), (3, 3)), 1), (((1, 2), (3, 0)), -1), (((1, 3), (2, 0)), 1),
+    (((1, 2), (3, 0)), 1), (((1, 1), (3, 3)), 1), (((2, 3), (1, 0)), -1),
+    (((1, 3), (2, 0)), -1), (((2, 3), (1, 0)), 1), (((1, 1), (2, 2)), 1),
+)  # fmt: skip
+_FIRST = np.array([4 * i + j for ((i, j), _), _ in _PAIRS])
+_SECOND = np.array([4 * i + j for (_, (i, j)), _ in _PAIRS])
+_SIGN = np.array([sign for _, sign in _PAIRS], np.float32)
+_TWO, _ONE = number(2.0), number(1.0)
+
+
+def rotation_matrix(quaternion: Floats) -> Floats:
+    """Return the rotation matrices of quaternions.
+
+    Args:
+        quaternion: wxyz, float32, shape (N, 4); its length does not matter.
+
+    Returns:
+        Shape (N, 3, 3), float32; column i is the frame's axis i in the world.
+    """
+    # Sums of four depend on their order, so torch adds.
+    scale = _TWO / torch.from_numpy(quaternion * quaternion).sum(-1, keepdim=True).numpy()
+    products = (quaternion[:, :, None] * quaternion[:, None, :]).reshape(len(quaternion), 16)
+    entries: Floats = scale * (products.take(_FIRST, 1) + _SIGN * products.take(_SECOND, 1))
+    entries[:, ::4] = _ONE - entries[:, ::4]
+    return entries.reshape(len(quaternion), 3, 3)
+
+
+def last_euler_angle(matrix: Floats) -> Floats:
+    """Return the third of the angles by which turning about x, then y, then z gives a rotation.
+
+    The turns are about the axes of the frame being turned ("XYZ" in native's words).
+
+    Args:
+        matrix: Rotation matrices, shape (N, 3, 3).
+
+    Returns:
+        Angle in (-π, π], shape (N,) (rad).
+    """
+    return arctan2(-matrix[:, 0, 1], matrix[:, 0, 0])
+
+
+def quaternion(matrix: torch.Tensor) -> torch.Tensor:
+    """Return the quaternion of one rotation matrix, wxyz, float32, (4,), w ≥ 0.
+
+    Of the four ways to read it off, the one that divides by the largest number.
+
+    Args:
+        matrix: Shape (3, 3), float32.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
+    doubled = torch.stack(
+        [
+            1.0 + xx + yy + zz,
+            1.0 + xx - yy - zz,
+            1.0 - xx + yy - zz,
+            1.0 - xx - yy + zz,
+        ]
+    )
+    root = sqrt(doubled.clamp(min=0.0))
+    squared = root**2
+    rows = (
+        (squared[0], zy - yz, xz - zx, yx - xy),
+        (zy - yz, squared[1], yx + xy, xz + zx),
+        (xz - zx, yx + xy, squared[2], zy + yz),
+        (yx - xy, zx + xz, zy + yz, squared[3]),
+    )
+    largest = int(root.argmax())
+    found = torch.stack(rows[largest]) / (2.0 * root[largest].clamp(min=0.1))
+    return -found if found[0] < 0 else found

@@ -1,0 +1,166 @@
+"""Contact forces of declared pairs of a link and a body, in SAPIEN."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import sapien.physx as physx
+
+from robot_layouts.simulation.backend import Overlap, Pair, Part
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.sapien3.robot import SimulatedRobot
+from robot_layouts.simulation.sapien3.world import BuiltWorld
+
+_Table = dict[tuple[int, int], tuple[int, int]]
+
+
+class PairForces:
+    """Reads the contact forces of the same pairs, step after step.
+
+    PhysX refreshes contacts only in a step: after a teleport they are still those of the last one.
+    """
+
+    def __init__(self, worlds: Sequence[BuiltWorld], pairs: Sequence[Pair]) -> None:
+        """Look the pairs up in every world."""
+        self._contacts = [world.system.get_contacts for world in worlds]
+        self._tables = [_table(world, pairs) for world in worlds]
+        self._shape = len(pairs), len(worlds), 3
+        self._timestep = np.array(worlds[0].physics.timestep, np.float32)
+
+    def read(self) -> Floats | None:
+        """Return the forces, (P, N, 3) (N, world frame), or None if no pair touches."""
+        forces: Floats | None = None
+        for env, contacts in enumerate(self._contacts):
+            for pair, impulse in _impulses(contacts(), self._tables[env]).items():
+                if forces is None:
+                    forces = np.zeros(self._shape, np.float32)
+                forces[pair, env] = impulse.astype(np.float32) / self._timestep
+        return forces
+
+
+def _table(world: BuiltWorld, pairs: Sequence[Pair]) -> _Table:
+    """Return each pair's number and the sign of its impulses, by the identity of the bodies."""
+    table: _Table = {}
+    for number, pair in enumerate(pairs):
+        link = id(world.robots[pair.robot].links[pair.link])
+        body = id(world.bodies[pair.body].component)
+        table[link, body] = number, 1  # an impulse acts on the first
+        table[body, link] = number, -1
+    return table
+
+
+def _impulses(contacts: Sequence[Any], table: _Table) -> dict[int, Any]:
+    """Return the impulse on each link that is touched, (3,) (N·s), by the pair's number."""
+    impulses: dict[int, Any] = {}
+    for contact in contacts:
+        first, second = contact.bodies
+        found = table.get((id(first), id(second)))
+        if found is not None:
+            pair, sign = found
+            # Native adds them up in float64.
+            total = np.sum([point.impulse for point in contact.points], axis=0) * sign
+            impulses[pair] = impulses.get(pair, np.zeros(3)) + total
+    return impulses
+
+
+class ArmContacts:
+    """Steps the physics of a world and remembers which links of different arms touch."""
+
+    def __init__(self, world: BuiltWorld) -> None:
+        """Look up whose each link is."""
+        self._advance, self._contacts = world.stepper(), world.system.get_contacts
+        self._links = {
+            id(link): (arm, Part(robot.name, link.name))
+            for robot in world.robots.values()
+            for arm, link in _links_of_arms(robot)
+        }
+        self._seen: dict[tuple[Part, Part], None] = {}
+
+    def step(self) -> None:
+        """Advance by one step of physics."""
+        self._advance()
+        links = self._links
+        for contact in self._contacts():
+            one, other = (links.get(id(body)) for body in contact.bodies)
+            if one and other and one[0] != other[0] and _touch(contact):
+                self._seen[one[1], other[1]] = None
+
+    def take(self) -> list[tuple[Part, Part]]:
+        """Return what touched since it was last asked."""
+        seen, self._seen = list(self._seen), {}
+        return seen
+
+
+def _touch(contact: Any) -> bool:
+    """Tell whether two bodies that are near each other touch."""
+    return any(point.separation <= 0 or np.any(point.impulse) for point in contact.points)
+
+
+def _links_of_arms(robot: SimulatedRobot) -> Iterator[tuple[tuple[str, str], Any]]:
+    """Yield the links of a robot, each with its arm: the robot and, if it has limbs, the limb.
+
+    A link is of the limb that has the last joint on the way to it; what is of no limb is left out
+    if there are limbs.
+    """
+    descriptor = robot.descriptor
+    if not descriptor.limbs:
+        yield from (((robot.name, ""), link) for link in robot.links.values())
+        return
+    limbs = {joint: part for part in descriptor.limbs for joint in descriptor.parts[part].joints}
+    for link in robot.links.values():
+        at = link
+        while at is not None and (at.joint is None or at.joint.name not in limbs):
+            at = at.parent
+        if at is not None:
+            yield (robot.name, limbs[at.joint.name]), link
+
+
+def overlaps_in(world: BuiltWorld) -> list[Overlap]:
+    """Return which parts of a world are inside each other, by the contacts of the last step."""
+    parts: dict[int, Part] = {}
+    for robot in world.robots.values():
+        parts.update((id(link), Part(robot.name, name)) for name, link in robot.links.items())
+    parts.update((id(body.component), Part(None, name)) for name, body in world.bodies.items())
+    found: list[Overlap] = []
+    for contact in world.system.get_contacts():
+        depth = max((-point.separation for point in contact.points), default=0.0)
+        if depth > 0:
+            one, other = (parts[id(body)] for body in contact.bodies)
+            found.append(Overlap(one, other, float(depth)))
+    return found
+
+
+def presses_on_object(contacts: Sequence[Any]) -> bool:
+    """Tell whether a contact that carries force joins a link and a body that physics moves."""
+    return any(
+        sorted(map(_kind, contact.bodies)) == ["link", "movable"]
+        and any(np.any(point.impulse) for point in contact.points)
+        for contact in contacts
+    )
+
+
+def _kind(body: Any) -> str:
+    if hasattr(body, "articulation"):
+        return "link"
+    return "fixed" if getattr(body, "kinematic", True) else "movable"
+
+
+def extents_of(world: BuiltWorld) -> dict[Part, Floats]:
+    """Return the box around each link and body that collides; see `Backend`."""
+    return {
+        part: component.get_global_aabb_fast()
+        for part, component in _components(world)
+        if any(
+            not isinstance(s, physx.PhysxCollisionShapePlane) for s in component.collision_shapes
+        )
+    }
+
+
+def _components(world: BuiltWorld) -> Iterator[tuple[Part, Any]]:
+    for robot in world.robots.values():
+        for link in robot.links.values():
+            yield Part(robot.name, link.name), link
+    for body in world.bodies.values():
+        yield Part(None, body.declared.name), body.component

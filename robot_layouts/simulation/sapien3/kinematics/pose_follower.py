@@ -1,0 +1,197 @@
+"""Which joints bring a link to a pose, by the search with which native's controllers drive.
+
+It is SAPIEN's Pinocchio, on the robot's own URDF and with native's arguments: its results are
+native's to the last bit. `arm_model` beside it takes SAPIEN's model of what was built, whose
+numbers are rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import sapien
+from numpy.typing import NDArray
+from sapien.wrapper.pinocchio_model import PinocchioModel
+
+from robot_layouts.kinematics.rotations import rotation_of, rotation_vector
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.sapien3.robot import SimulatedRobot
+from robots import DescriptorError, UnknownNameError
+
+_MAX_ITERATIONS = 100  # mani_skill 3.0.1, agents/controllers/utils/kinematics.py
+_MOST_DESCENTS = 30
+_LONGEST_STEP, _SETTLED = 0.3, 1e-4  # of a joint, per descent (rad, m)
+_NEAR_ENOUGH = 1e-3  # m
+_DAMPING = 1e-5
+_GRAVITY = [0, 0, -9.81]  # as there; it moves nothing here
+
+
+JOINTS_OF_A_POSE = 6
+
+
+class PoseFollower:
+    """Follows poses of one link of a robot; see `robot_layouts.simulation.backend.PoseFollower`."""
+
+    def __init__(
+        self,
+        robot: SimulatedRobot,
+        urdf: str,
+        link: str,
+        root_link: str | None,
+        joints: Sequence[str],
+    ) -> None:
+        """Read the robot's kinematic model.
+
+        Args:
+            robot: The robot, for the order of its joints and links.
+            urdf: Its URDF.
+            link: The link that is to follow.
+            root_link: Link whose frame poses are in; the robot's root if None.
+            joints: Those that may move.
+
+        Raises:
+            UnknownNameError: If the robot has no such link.
+            DescriptorError: If the joints do not move the link.
+        """
+        for name in (link, root_link):
+            if name is not None:
+                robot.link(name)
+        tree = _Subtree(urdf, root_link)
+        active = [joint.name for joint in robot.joints if joint.name in tree.joints]
+        links = [name for name in robot.links if name in tree.links]
+        if link not in links:
+            raise UnknownNameError(f"link beyond {root_link}", link, links)
+        idle = [joint for joint in joints if joint not in tree.path(link)]
+        if len(idle) == len(joints):
+            raise DescriptorError(
+                f"{robot.descriptor.name}: none of {', '.join(joints)} moves {link}"
+            )
+        self._pose: Any = sapien.Pose
+        self._model: Any = PinocchioModel(tree.text, _GRAVITY)
+        self._model.set_joint_order(active)
+        self._model.set_link_order(links)
+        self._link = links.index(link)
+        declared = robot.descriptor.joints
+        self._taken: NDArray[np.intp] = np.array([declared.index(joint) for joint in active])
+        self._moved: NDArray[np.intp] = np.array([active.index(joint) for joint in joints])
+        self._mask = np.zeros(len(active), np.int32)
+        self._mask[self._moved] = 1
+        limits = np.concatenate([joint.limits for joint in robot.driven]).astype(float)
+        self._limits = limits[[declared.index(joint) for joint in joints]].T
+
+    def follow(
+        self, position: Floats, quaternion: Floats, qpos: Floats, /
+    ) -> NDArray[np.float64] | None:
+        """Return the joints, or None; see `robot_layouts.simulation.backend.PoseFollower`."""
+        found, solved, _ = self._model.compute_inverse_kinematics(
+            self._link,
+            self._pose(position, quaternion),
+            initial_qpos=qpos[self._taken],
+            active_qmask=self._mask,
+            max_iterations=_MAX_ITERATIONS,
+        )
+        return found[self._moved] if solved else None
+
+
+class NearestFollower(PoseFollower):
+    """Follows places with arms of too few joints to choose an orientation as well.
+
+    The place comes first; of what then is free, the orientation gets as near as it can. Native has
+    no such control.
+    """
+
+    def follow(
+        self, position: Floats, quaternion: Floats, qpos: Floats, /
+    ) -> NDArray[np.float64] | None:
+        """Return the joints, or None if the place cannot be had."""
+        goal, turn = position.astype(float), rotation_of(quaternion)
+        found = qpos[self._taken].astype(float)
+        for _ in range(_MOST_DESCENTS):
+            place, toward, slopes = self._errors(found, goal, turn)
+            step = _first_then(place, toward, slopes)
+            longest = np.abs(step).max()
+            moved = found[self._moved] + step * min(1.0, _LONGEST_STEP / max(longest, 1e-12))
+            found[self._moved] = np.clip(moved, *self._limits)
+            if longest < _SETTLED:
+                break
+        place, _, _ = self._errors(found, goal, turn)
+        return found[self._moved] if np.linalg.norm(place) < _NEAR_ENOUGH else None
+
+    def _errors(self, qpos: Any, goal: Any, turn: Any) -> tuple[Any, Any, Any]:
+        """Return what is missing to place and orientation, and its slopes, in the link's frame."""
+        self._model.compute_forward_kinematics(qpos)
+        now = np.array(self._model.get_link_pose(self._link).to_transformation_matrix(), float)
+        back = now[:3, :3].T
+        slopes = self._model.compute_single_link_local_jacobian(qpos, self._link)
+        toward = rotation_vector(back @ turn)
+        return back @ (goal - now[:3, 3]), toward, np.array(slopes)[:, self._moved]
+
+
+def _first_then(first: Any, second: Any, slopes: Any) -> Any:
+    """Return the joint steps that mend three errors, and of three others what is left."""
+    inverse = _inverted(slopes[:3])
+    step = inverse @ first
+    free = np.eye(slopes.shape[1]) - inverse @ slopes[:3]
+    return step + free @ (_inverted(slopes[3:] @ free) @ (second - slopes[3:] @ step))
+
+
+def _inverted(slopes: Any) -> Any:
+    """Return a damped inverse of three rows."""
+    return slopes.T @ np.linalg.inv(slopes @ slopes.T + _DAMPING * np.eye(3))
+
+
+class _Subtree:
+    """What a link of a URDF holds, itself the root; all of the URDF if it is None.
+
+    Attributes:
+        text: Its XML.
+        links: Names of its links.
+        joints: Names of its joints.
+    """
+
+    def __init__(self, urdf: str, root_link: str | None) -> None:
+        root = ElementTree.fromstring(urdf)
+        self._above = {_end(joint, "child"): joint for joint in root.iterfind("joint")}
+        _complete_limits(self._above.values())
+        if root_link is not None:
+            for element in list(root):
+                last = _end(element, "child") if element.tag == "joint" else element.get("name", "")
+                beyond = root_link in self._links_above(last)
+                if not beyond or (element.tag == "joint" and last == root_link):
+                    root.remove(element)
+        self.text = ElementTree.tostring(root, encoding="unicode")
+        self.links = {link.get("name", "") for link in root.iterfind("link")}
+        self.joints = {joint.get("name", "") for joint in root.iterfind("joint")}
+
+    def path(self, link: str) -> set[str]:
+        """Return the joints that move a link."""
+        return {
+            self._above[name].get("name", "")
+            for name in self._links_above(link)
+            if name in self._above
+        }
+
+    def _links_above(self, link: str) -> list[str]:
+        """Return a link and all that it hangs on."""
+        chain = [link]
+        while (joint := self._above.get(chain[-1])) is not None:
+            chain.append(_end(joint, "parent"))
+        return chain
+
+
+def _end(joint: ElementTree.Element, which: str) -> str:
+    end = joint.find(which)
+    return "" if end is None else end.get("link", "")
+
+
+def _complete_limits(joints: Iterable[ElementTree.Element]) -> None:
+    """Give limits what Pinocchio's parser insists on, and the search makes no use of."""
+    for joint in joints:
+        if joint.find("limit") is None and joint.get("type") in ("revolute", "prismatic"):
+            ElementTree.SubElement(joint, "limit")
+        for limit in joint.iterfind("limit"):
+            for key in ("lower", "upper", "effort", "velocity"):
+                limit.set(key, limit.get(key, "0"))

@@ -1,0 +1,246 @@
+"""Pictures of one world of SAPIEN's, all lit alike but for what varies."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import sapien
+import torch
+from numpy.typing import NDArray
+
+from robot_layouts.simulation.rotations import quaternion
+from robot_layouts.simulation.sapien3.device import expect_render_device
+from robot_layouts.simulation.sapien3.pictures.backdrop import (
+    COLOR,
+    PLACE,
+    Backdrop,
+    Bodies,
+    planes,
+)
+from robot_layouts.simulation.sapien3.pictures.dressing import (
+    Wardrobe,
+    lamp_pose,
+    light_color,
+    shifted,
+    widened,
+)
+from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, View, camera_name
+from robot_layouts.simulation.scene.looks import AS_DECLARED, LIGHTS, Looks
+from robots import SimulationError
+from robots.descriptor import Vector3
+
+# mani_skill 3.0.1, envs/sapien_env.py, _load_lighting: red, green, blue; directions point away
+# from the lamp.
+SKY = (0.3, 0.3, 0.3)
+LAMPS = (((1.0, 1.0, -1.0), (1.0, 1.0, 1.0)), ((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)))
+
+# mani_skill 3.0.1, render/shaders.py, "minimal": what each image holds
+_SHADERS = "minimal"
+_FORMATS = {COLOR: "r8g8b8a8unorm", PLACE: "r16g16b16a16sint"}
+_IMAGES = {"rgb": COLOR, "depth": PLACE, "segmentation": PLACE, "position": PLACE}
+
+Drawn = Callable[[], list[View]]
+"""Waits until pictures are drawn, and returns what each camera sees."""
+
+
+def look(
+    world: BuiltWorld,
+    cameras: Mapping[str, AnyCamera],
+    textures: Sequence[str],
+    *,
+    markers: bool,
+) -> Drawn:
+    """Begin to draw what cameras see in a world now; see `look`."""
+    expect_render_device()
+    if world.studio is None:
+        world.studio = Studio(world)
+    return world.studio.look(cameras, textures, markers=markers)
+
+
+class Studio:
+    """The cameras and the lights of one world, made once: a render system takes few lights.
+
+    They live in a scene of their own beside the world's, so that looking changes nothing in it.
+    """
+
+    def __init__(self, world: BuiltWorld) -> None:
+        """Set up the lights."""
+        self._world = weakref.proxy(world)
+        self._scene = sapien.Scene([world.scene.render_system])
+        self._scene.set_ambient_light(list(SKY))
+        self._lamps: list[Any] = [
+            self._scene.add_directional_light(list(d), list(c)) for d, c in LAMPS
+        ]
+        self._cameras: dict[tuple[Any, ...], Any] = {}
+        self._markers = _markers(world)
+        self._bodies = Bodies(world)
+        self._backdrops: dict[Any, Backdrop] = {}
+        self._looks = AS_DECLARED  # that it has
+        self._wardrobe: Wardrobe | None = None
+
+    def look(
+        self, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
+    ) -> Drawn:
+        """Begin to take pictures with all cameras, of the same moment.
+
+        The driver draws in threads of its own, also while other worlds' pictures are begun.
+        """
+        if self._world.looks is not self._looks:
+            self._dress(self._world.looks)
+        for marker in self._markers:
+            marker.visibility = float(markers)
+        placed = [self._placed(name, camera) for name, camera in cameras.items()]
+        self._scene.update_render()
+        if markers or not self._bodies.solid:
+            return self._whole(placed, textures)
+        riding = [isinstance(camera, RobotCamera) for camera in cameras.values()]
+        return self._layered(placed, riding, textures)
+
+    def _whole(self, cameras: Sequence[Any], textures: Sequence[str]) -> Drawn:
+        """Begin to take pictures of everything at once."""
+        self._bodies.show_all()
+        for camera in cameras:
+            camera.take_picture()
+        names = {_IMAGES[texture] for texture in textures}
+        return lambda: [_view(camera, textures, _pictures(camera, names)) for camera in cameras]
+
+    def _layered(
+        self, cameras: Sequence[Any], riding: Sequence[bool], textures: Sequence[str]
+    ) -> Drawn:
+        """Begin to take pictures of what each camera may see.
+
+        Those of cameras that stand still show only what moves; what does not comes behind it.
+        """
+        standing = [camera for camera, rides in zip(cameras, riding, strict=True) if not rides]
+        backdrops = self._backdrops_of(standing)
+        self._bodies.show_moving([backdrop.planes for backdrop in backdrops.values()])
+        for camera in standing:
+            camera.take_picture()
+        for camera in cameras:
+            if camera not in backdrops:
+                self._bodies.show_seen(planes(camera))
+                camera.take_picture()
+        names = {_IMAGES[texture] for texture in textures}
+
+        def views() -> list[View]:
+            found: list[View] = []
+            for camera in cameras:
+                backdrop = backdrops.get(camera)
+                images = backdrop.behind(camera, names) if backdrop else _pictures(camera, names)
+                if images is None:
+                    return self._whole(cameras, textures)()
+                found.append(_view(camera, textures, images))
+            return found
+
+        return views
+
+    def _backdrops_of(self, cameras: Sequence[Any]) -> dict[Any, Backdrop]:
+        poses = self._bodies.still_poses()
+        for camera in cameras:
+            backdrop = self._backdrops.get(camera)
+            if backdrop is None or not backdrop.fits(camera, poses):
+                self._bodies.show_still()
+                camera.take_picture()
+                self._backdrops[camera] = Backdrop(camera, poses)
+        return {camera: self._backdrops[camera] for camera in cameras}
+
+    def _placed(self, name: str, camera: AnyCamera) -> Any:
+        lens = camera.mount if isinstance(camera, RobotCamera) else camera
+        key = name, lens.width, lens.height, lens.fov, lens.near, lens.far
+        if key not in self._cameras:
+            self._cameras[key] = self._add_camera(*key)
+        placed = self._cameras[key]
+        if isinstance(camera, RobotCamera):
+            link = self._world.robots[camera.robot].link(camera.mount.link)
+            mount = camera.mount
+            placed.entity.set_pose(link.entity_pose)
+            pose = sapien.Pose(list(mount.position), list(mount.quaternion))
+        else:
+            pose = look_at(camera.eye, camera.target)
+        shift = self._looks.cameras.get(camera_name(camera))
+        placed.local_pose = pose if shift is None else shifted(pose, shift)
+        if shift is not None:
+            placed.set_fovy(widened(lens.fov, shift), compute_x=True)
+        return placed
+
+    def _dress(self, looks: Looks) -> None:
+        """Let everything look as it is to from now on."""
+        self._looks = looks
+        self._bodies.show_all()
+        if looks.patterns or looks.paints:
+            if self._wardrobe is None:
+                self._wardrobe = Wardrobe(self._world)
+            self._wardrobe.dress(looks)
+            self._markers = _markers(self._world)
+        *names, everywhere = LIGHTS
+        for name, lamp, (direction, color) in zip(names, self._lamps, LAMPS, strict=True):
+            if glow := looks.lights.get(name):
+                lamp.color = light_color(color, glow)
+                lamp.entity.set_pose(lamp_pose(direction, glow))
+        if glow := looks.lights.get(everywhere):
+            self._scene.set_ambient_light(light_color(SKY, glow))
+        self._bodies, self._backdrops = Bodies(self._world), {}
+
+    def _add_camera(
+        self, name: str, width: int, height: int, fov: float, near: float, far: float
+    ) -> Any:
+        # Process-wide, bound when a camera is made; others in this process may have changed them.
+        sapien.render.set_camera_shader_dir(_SHADERS)
+        for image, pixels in _FORMATS.items():
+            sapien.render.set_picture_format(image, pixels)
+        return self._scene.add_camera(name, width, height, fov, near, far)
+
+
+def _markers(world: BuiltWorld) -> list[Any]:
+    return [
+        body.entity.find_component_by_type(sapien.render.RenderBodyComponent)
+        for body in world.bodies.values()
+        if body.declared.marker
+    ]
+
+
+def _pictures(camera: Any, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    return {name: camera.get_picture(name) for name in names}
+
+
+def _view(camera: Any, textures: Sequence[str], images: Mapping[str, NDArray[Any]]) -> View:
+    pixels = {texture: images[_IMAGES[texture]] for texture in textures}
+    channels = {
+        "rgb": lambda x: x[..., :3],
+        "depth": lambda x: -x[..., 2:3],
+        "segmentation": lambda x: x[..., 3:],
+        "position": lambda x: x[..., :3],
+    }
+    return View(
+        {texture: channels[texture](x) for texture, x in pixels.items()},
+        camera.get_extrinsic_matrix(),
+        camera.get_model_matrix(),
+        camera.get_intrinsic_matrix(),
+    )
+
+
+def look_at(eye: Vector3, target: Vector3) -> sapien.Pose:
+    """Return the pose of a camera at ``eye`` that looks at ``target`` with z up (m, world).
+
+    A camera looks along its own +x, with +z up. Float32, in the order of native's own operations.
+
+    Raises:
+        SimulationError: If the two points coincide.
+    """
+    start, end = torch.tensor([eye, target], dtype=torch.float32)
+    if torch.equal(start, end):
+        raise SimulationError(f"a camera at {eye} cannot look at the point where it is")
+    forward = _unit((end - start)[None])
+    up = torch.tensor([[0.0, 0.0, 1.0]])
+    if torch.linalg.vector_norm(torch.linalg.cross(up, forward)) < 1e-6:
+        up = torch.tensor([[1.0, 0.0, 0.0]])  # straight down or up: +x is up in the picture
+    left = _unit(torch.linalg.cross(up, forward))
+    axes = torch.stack([forward, left, torch.linalg.cross(forward, left)], dim=-1)
+    return sapien.Pose(start.tolist(), quaternion(axes[0]).tolist())
+
+
+def _unit(rows: torch.Tensor) -> torch.Tensor:
+    return rows / torch.linalg.vector_norm(rows, dim=-1, keepdim=True)

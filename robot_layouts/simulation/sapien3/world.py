@@ -1,0 +1,255 @@
+"""One world in SAPIEN: a scene with a layout's robots and a task's bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import sapien
+import sapien.physx as physx
+
+from layouts import Layout
+from robot_layouts.core.portable import is_portable
+from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
+from robot_layouts.simulation.sapien3.blueprint import Blueprint, read_blueprint
+from robot_layouts.simulation.sapien3.collision import add_collision
+from robot_layouts.simulation.sapien3.collision_groups import FLOOR
+from robot_layouts.simulation.sapien3.device import expect_render_device, outlive_forks
+from robot_layouts.simulation.sapien3.exact_division import divide_exactly
+from robot_layouts.simulation.sapien3.robot import SimulatedRobot
+from robot_layouts.simulation.scene.looks import AS_DECLARED
+from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.scene.shapes import Shape
+from robot_layouts.simulation.world import Body, World
+from robots import SimulationError
+
+
+def apply_settings(settings: PhysicsSettings) -> None:
+    """Write the settings into SAPIEN's process-wide configuration.
+
+    They bind when a scene, a body or a shape is made, so this runs before every build: another
+    world's build may have changed them since.
+    """
+    physx.set_shape_config(contact_offset=settings.contact_offset, rest_offset=settings.rest_offset)
+    physx.set_body_config(
+        solver_position_iterations=settings.position_iterations,
+        solver_velocity_iterations=settings.velocity_iterations,
+        sleep_threshold=settings.sleep_threshold,
+    )
+    gravity: Any = settings.gravity  # SAPIEN takes any sequence
+    physx.set_scene_config(
+        gravity=gravity,
+        bounce_threshold=settings.bounce_threshold,
+        enable_pcm=settings.persistent_contacts,
+        enable_tgs=settings.temporal_gauss_seidel,
+        enable_ccd=settings.continuous_collision,
+        enable_enhanced_determinism=settings.enhanced_determinism,
+        enable_friction_every_iteration=settings.friction_every_iteration,
+        cpu_workers=0,  # more workers are slower for scenes this small
+    )
+    friction = settings.friction
+    physx.set_default_material(friction.static, friction.dynamic, friction.restitution)
+
+
+class BuiltBody(NamedTuple):
+    """A body in SAPIEN.
+
+    Attributes:
+        declared: What the task declared.
+        entity: SAPIEN's entity.
+        component: Its physics component.
+        start_pose: Pose it was built at.
+    """
+
+    declared: Body
+    entity: sapien.Entity
+    component: Any
+    start_pose: sapien.Pose
+
+
+class BuiltWorld:
+    """Robots first, in the layout's order, then bodies in the order declared.
+
+    Attributes:
+        layout: Which robots stand where.
+        physics: Settings it was built with.
+        visuals: Whether it has what pictures need.
+        scene: SAPIEN's scene.
+        system: Its physics system.
+        robots: Robot by name in the layout.
+        articulations: The robots' articulations, in layout order.
+        bodies: Body by name.
+        studio: Its cameras and lights, once a picture was taken.
+        built: What varied parts were built with; see `robot_layouts.simulation.sapien3.varied`.
+        looks: What differs in its pictures.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        physics: PhysicsSettings | None = None,
+        *,
+        visuals: bool = False,
+        blueprints: dict[str, Blueprint] | None = None,
+        links_pass: bool = False,
+    ) -> None:
+        """Build the robots of a layout.
+
+        Args:
+            layout: Which robots stand where.
+            physics: Solver settings; None keeps SAPIEN's own defaults.
+            visuals: Whether to build what pictures need (a Vulkan driver must be present).
+            blueprints: What was read of the robots for an earlier world that is like this one,
+                by name; what is missing is read and added.
+            links_pass: See `robot_layouts.simulation.World`.
+
+        Raises:
+            AssetError: If a robot's files cannot be found.
+            SimulationError: If pictures are wanted and there is no Vulkan driver, or this process
+                was begun to be portable and cannot be.
+        """
+        self.layout = layout
+        self.physics = SAPIEN_DEFAULTS if physics is None else physics
+        self.visuals = visuals
+        if is_portable():
+            divide_exactly()
+        apply_settings(self.physics)
+        self.system = physx.PhysxCpuSystem()
+        systems: list[Any] = [self.system]
+        if visuals:
+            systems.append(_render_system())
+            outlive_forks(self)
+        self.scene = sapien.Scene(systems)
+        self.system.timestep = self.physics.timestep
+        blueprints = {} if blueprints is None else blueprints
+        self.robots: dict[str, SimulatedRobot] = {}
+        for number, (name, placement) in enumerate(layout.items()):
+            if name not in blueprints:
+                blueprints[name] = read_blueprint(placement.robot, visuals=visuals)
+            blueprint = blueprints[name]
+            self.robots[name] = SimulatedRobot(
+                self.scene, name, placement, blueprint, number, links_pass=links_pass
+            )
+        self.articulations = [robot.articulation for robot in self.robots.values()]
+        self.bodies: dict[str, BuiltBody] = {}
+        self.built: dict[tuple[Part, str], Any] = {}
+        self.looks = AS_DECLARED
+        self.studio: Any = None  # as long as this world lives, also in a fork
+
+    def add(self, body: Body) -> BuiltBody:
+        """Build a body."""
+        builder = self.scene.create_actor_builder()
+        for shape in body.shapes:
+            add_collision(builder, shape)
+        builder.set_physx_body_type(body.kind)
+        pose = sapien.Pose(list(body.position), list(body.quaternion))
+        builder.set_initial_pose(pose)
+        entity = builder.build(body.name)
+        if self.visuals:
+            _draw(entity, body.shapes)
+        component: Any = entity.find_component_by_type(
+            physx.PhysxRigidStaticComponent
+            if body.kind == "static"
+            else physx.PhysxRigidDynamicComponent
+        )
+        for shape in component.collision_shapes:
+            if isinstance(shape, physx.PhysxCollisionShapePlane):
+                shape.set_collision_groups([*FLOOR, 0, 0])
+        if body.scale != 1.0:
+            pose = _on_its_place(body, component, pose)
+        built = self.bodies[body.name] = BuiltBody(body, entity, component, pose)
+        return built
+
+    def settle(self) -> None:
+        """End the build: set every start pose once more, as native does."""
+        for body in self.bodies.values():
+            if body.declared.kind != "static":
+                body.entity.set_pose(body.start_pose)
+        for robot in self.robots.values():
+            robot.articulation.set_root_pose(robot.base_pose)
+
+    def clear(self) -> None:
+        """Begin a reset: zero every velocity and force, and put anchored bodies back.
+
+        PhysX keeps its contact caches: a reset world remembers, a rebuilt one does not.
+        """
+        for body in self.bodies.values():
+            if body.declared.kind == "dynamic":
+                body.component.set_linear_velocity([0.0, 0.0, 0.0])
+                body.component.set_angular_velocity([0.0, 0.0, 0.0])
+        for robot in self.robots.values():
+            robot.stop()
+        for body in self.bodies.values():
+            if body.declared.anchored:
+                body.entity.set_pose(body.start_pose)
+
+    def stepper(self) -> Callable[[], None]:
+        """Return what advances physics by one step."""
+        linkages = [linkage for robot in self.robots.values() for linkage in robot.linkages]
+        step: Callable[[], None] = self.system.step
+        if not linkages:
+            return step
+
+        def pulled() -> None:
+            for linkage in linkages:
+                linkage.pull()
+            step()
+
+        return pulled
+
+    def set_pose(self, name: str, row: list[float]) -> None:
+        """Move a body to a position (m) and quaternion (wxyz), (7,)."""
+        self.bodies[name].entity.set_pose(sapien.Pose(row[:3], row[3:]))
+
+    def place(self, name: str, row: list[float]) -> None:
+        """Move a body to where the task wants it; see `scale`."""
+        self.set_pose(name, row)
+        body = self.bodies[name]
+        if body.declared.scale != 1.0:
+            pose = sapien.Pose(row[:3], row[3:])
+            body.entity.set_pose(_on_its_place(body.declared, body.component, pose))
+
+
+def build_world(world: World, blueprints: dict[str, Blueprint]) -> BuiltWorld:
+    """Build what a task declared; see `BuiltWorld` for the arguments and errors."""
+    built = BuiltWorld(
+        world.layout,
+        world.physics,
+        visuals=world.visuals,
+        blueprints=blueprints,
+        links_pass=world.links_pass,
+    )
+    for body in world.bodies.values():
+        built.add(body)
+    built.settle()
+    return built
+
+
+def _on_its_place(body: Body, component: Any, pose: sapien.Pose) -> sapien.Pose:
+    """Return a pose at which a body that stands at ``pose`` has its lowest point as declared."""
+    if not component.collision_shapes:
+        return pose
+    lowest = float(component.compute_global_aabb_tight()[0][2])
+    x, y, z = (float(value) for value in pose.p)
+    return sapien.Pose([x, y, z + (z - lowest) * (body.scale - 1) / body.scale], pose.q)
+
+
+def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:
+    from robot_layouts.simulation.sapien3.visuals import visual_component
+
+    component = visual_component(shapes)
+    if component is not None:
+        entity.add_component(component)
+
+
+def _render_system() -> Any:
+    from sapien.render import RenderSystem
+
+    expect_render_device()
+    try:
+        return RenderSystem()
+    except RuntimeError as error:
+        raise SimulationError(
+            f"pictures need a Vulkan driver, and none works here ({error}); without pictures"
+            " (render_mode=None, obs_mode='state') everything else works"
+        ) from error

@@ -1,0 +1,206 @@
+"""Shapes that bodies are made of, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated
+
+from robot_layouts.core.bounds import FAR, expect_unit
+from robot_layouts.core.schema import check_fields, within
+from robot_layouts.simulation.physics import Friction
+from robots import SimulationError
+from robots.descriptor import IDENTITY, Quaternion
+
+Fraction = Annotated[float, within(0.0, 1.0)]
+Color = tuple[Fraction, Fraction, Fraction, Fraction]  # red, green, blue, alpha
+
+Length = Annotated[float, within(1e-6, FAR, "m")]
+"""Of an edge, a radius, half of either: more than none."""
+Lengths = tuple[Length, Length, Length]
+Density = Annotated[float, within(1e-3, 1e6, "kg/m³")]
+Coordinate = Annotated[float, within(-FAR, FAR, "m")]
+Place = tuple[Coordinate, Coordinate, Coordinate]
+Factor = Annotated[float, within(1e-6, FAR)]
+
+GREY: Color = (0.7, 0.7, 0.7, 1.0)
+
+
+@dataclass(frozen=True)
+class Finish:
+    """How a surface throws light back, each from 0 to 1.
+
+    Attributes:
+        metallic: 0 for paint, 1 for metal.
+        roughness: 0 for a mirror, 1 for chalk.
+        specular: Strength of highlights.
+    """
+
+    metallic: Fraction = 0.0
+    roughness: Fraction = 1.0
+    specular: Fraction = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what no surface can be.
+
+        Raises:
+            SimulationError: If a value is of a wrong type or out of bounds.
+        """
+        check_fields(self, SimulationError)
+
+
+MATT = Finish()
+POLISHED = Finish(metallic=1.0, roughness=0.0, specular=1.0)
+
+
+def linear(code: str) -> Color:
+    """Return the colour of a code like ``"#FFD289"``, which is of light as screens encode it."""
+    red, green, blue = ((int(code[i : i + 2], 16) / 255) ** 2.2 for i in (1, 3, 5))
+    return red, green, blue, 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """What all shapes share.
+
+    Attributes:
+        position: Centre in the body's frame (m).
+        quaternion: Orientation in the body's frame, wxyz.
+        friction: Contact material; None takes the world's.
+        density: Density (kg/m³).
+        color: Colour when drawn.
+        finish: Surface when drawn.
+        collides: Whether it takes part in contacts.
+        visible: Whether it is drawn.
+    """
+
+    position: Place = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = IDENTITY
+    friction: Friction | None = None
+    density: Density = 1000.0
+    color: Color = GREY
+    finish: Finish = MATT
+    collides: bool = True
+    visible: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse what no shape can be.
+
+        Raises:
+            SimulationError: If a value is of a wrong type or out of bounds.
+        """
+        check_fields(self, SimulationError)
+        expect_unit(f"{type(self).__name__}: quaternion", self.quaternion, SimulationError)
+
+
+@dataclass(frozen=True)
+class Box(Shape):
+    """A box.
+
+    Attributes:
+        half_size: Half its extents along x, y, z (m).
+    """
+
+    half_size: Lengths
+
+
+@dataclass(frozen=True)
+class Sphere(Shape):
+    """A sphere.
+
+    Attributes:
+        radius: Radius (m).
+    """
+
+    radius: Length
+
+
+@dataclass(frozen=True)
+class Cylinder(Shape):
+    """A cylinder along its own x axis.
+
+    Attributes:
+        radius: Radius (m).
+        half_length: Half its length (m).
+    """
+
+    radius: Length
+    half_length: Length
+
+
+@dataclass(frozen=True)
+class Capsule(Shape):
+    """A capsule along its own x axis.
+
+    Attributes:
+        radius: Radius (m).
+        half_length: Half the length of its straight part (m).
+    """
+
+    radius: Length
+    half_length: Length
+
+
+@dataclass(frozen=True)
+class Plane(Shape):
+    """An infinite plane, such as a floor; its own +x axis is the outward normal.
+
+    It lets the links through that a robot's ``no_floor_contact`` names.
+    """
+
+
+@dataclass(frozen=True)
+class Mesh(Shape):
+    """A mesh file; its convex hull collides.
+
+    Attributes:
+        file: Mesh file.
+        scale: Scale along x, y, z.
+        textured: Whether it is drawn as its file says; else in ``color``, with the file's finish.
+    """
+
+    file: Path | str
+    scale: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
+    textured: bool = False
+
+
+@dataclass(frozen=True)
+class Floor(Shape):
+    """A square of the plane z = 0 that is drawn with a texture, and touches nothing.
+
+    Attributes:
+        texture: Image file.
+        size: Length of its sides (m), a whole number.
+        tile: Length of the texture's sides (m).
+    """
+
+    texture: Path | str
+    size: Annotated[int, within(1, FAR, "m", "whole number")] = 100
+    tile: Length = 4.0
+    collides: bool = field(default=False, kw_only=True)
+
+
+SIZED = (Box, Sphere, Cylinder, Capsule, Mesh)
+"""Shapes that can be larger or smaller."""
+
+
+def scaled(shape: Shape, factor: float) -> Shape:
+    """Return a shape of a body that is larger by a factor, its place in the body with it.
+
+    Raises:
+        SimulationError: If the shape has no size, as a plane has none.
+    """
+    x, y, z = shape.position
+    moved = replace(shape, position=(x * factor, y * factor, z * factor))
+    match moved:
+        case Box(half_size=(a, b, c)):
+            return replace(moved, half_size=(a * factor, b * factor, c * factor))
+        case Sphere():
+            return replace(moved, radius=moved.radius * factor)
+        case Cylinder() | Capsule():
+            radius, half_length = moved.radius * factor, moved.half_length * factor
+            return replace(moved, radius=radius, half_length=half_length)
+        case Mesh(scale=(a, b, c)):
+            return replace(moved, scale=(a * factor, b * factor, c * factor))
+        case _:
+            raise SimulationError(f"a {type(shape).__name__} has no size that could be changed")

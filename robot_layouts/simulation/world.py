@@ -1,0 +1,238 @@
+"""What a task puts into a world, as plain data that a backend builds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from layouts import Layout
+from robot_layouts.core.bounds import checked_choice, expect_unit, shown
+from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
+from robot_layouts.simulation.scene.shapes import Shape, scaled
+from robots import SimulationError, UnknownNameError
+from robots.descriptor import IDENTITY, Quaternion, Vector3
+
+BodyKind = Literal["dynamic", "kinematic", "static"]
+_KINDS = get_args(BodyKind)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body that a task puts into the world.
+
+    Attributes:
+        name: Its name, also in the state dict.
+        shapes: What it is made of, in its own frame.
+        kind: Whether physics, only the task, or nothing moves it.
+        position: Where it is built (m, world).
+        quaternion: How it is turned there, wxyz.
+        anchored: Whether every reset puts it back there.
+        marker: Whether it is there for people only: cameras that observe do not see it.
+        scale: Factor by which ``shapes`` are larger than the task declared them; wherever the task
+            puts it, its lowest point is where that of the declared body would be.
+    """
+
+    name: str
+    shapes: tuple[Shape, ...]
+    kind: BodyKind = "dynamic"
+    position: Vector3 = (0.0, 0.0, 0.0)
+    quaternion: Quaternion = IDENTITY
+    anchored: bool = False
+    marker: bool = False
+    scale: float = field(default=1.0, repr=False)
+
+
+@dataclass
+class Placements:
+    """What is to be placed, in any number of worlds at once.
+
+    Attributes:
+        bodies: By name, then by world: position (m) and quaternion (wxyz), seven numbers.
+        robots: Likewise: joint positions in the descriptor's order, (dof,) (rad, m).
+    """
+
+    bodies: dict[str, dict[int, list[float]]] = field(default_factory=dict)
+    robots: dict[str, dict[int, NDArray[np.float64]]] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        """Tell whether there is anything to place."""
+        return bool(self.bodies or self.robots)
+
+    def forget(self, env_ids: Iterable[int]) -> None:
+        """Leave out what was meant for some worlds."""
+        for env in env_ids:
+            for rows in (*self.bodies.values(), *self.robots.values()):
+                rows.pop(env, None)
+
+
+class World:
+    """Robots first, in the layout's order, then bodies in the order in which they are added.
+
+    The order of dynamic bodies decides the order in which PhysX solves contacts, so it is part of
+    what a task declares.
+
+    What is placed takes effect, in all worlds in one go, before a simulation next steps or is read.
+
+    Attributes:
+        layout: Which robots stand where.
+        physics: Settings it is built with.
+        visuals: Whether what pictures need is built.
+        bodies: Body by name.
+        design: Geometry drawn for the coming episodes, if the task draws any.
+        scales: Factor on the size of bodies, by name; 1 for those that are left out.
+        links_pass: Whether links of two robots pass through each other where the robots' files let
+            them pass through some of their own, as in ManiSkill; else robots always collide.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        physics: PhysicsSettings | None = None,
+        *,
+        visuals: bool = False,
+        number: int = 0,
+        placements: Placements | None = None,
+        links_pass: bool = False,
+    ) -> None:
+        """Begin without bodies.
+
+        Args:
+            layout: Which robots stand where.
+            physics: Solver settings; None keeps SAPIEN's own defaults.
+            visuals: Whether to build what pictures need (a Vulkan driver must be present).
+            number: Its number among the worlds of a simulation.
+            placements: Where that simulation looks for what is placed.
+            links_pass: See the attribute.
+        """
+        self.layout = layout
+        self.physics = SAPIEN_DEFAULTS if physics is None else physics
+        self.visuals = visuals
+        self.bodies: dict[str, Body] = {}
+        self.design: Any = None
+        self.scales: Mapping[str, float] = {}
+        self.links_pass = links_pass
+        self._number = number
+        self._placements = Placements() if placements is None else placements
+
+    def add(
+        self,
+        name: str,
+        *shapes: Shape,
+        kind: BodyKind = "dynamic",
+        position: Vector3 = (0.0, 0.0, 0.0),
+        quaternion: Quaternion = IDENTITY,
+        anchored: bool = False,
+        marker: bool = False,
+    ) -> Body:
+        """Add a body made of shapes.
+
+        Args:
+            name: A name no other body of this world has.
+            shapes: Its shapes, in the body's frame.
+            kind: ``"dynamic"`` moves by physics, ``"kinematic"`` by the task, ``"static"`` never.
+            position: Where it is built (m, world).
+            quaternion: How it is turned, wxyz.
+            anchored: Whether every reset puts it back there.
+            marker: Whether it is there for people only: cameras that observe do not see it.
+
+        Raises:
+            SimulationError: If the name is taken, or something is not what it must be.
+        """
+        self._check_body(name, shapes, kind)
+        if name in self.bodies:
+            raise SimulationError(f"this world already has a body called {name!r}")
+        self._pose(name, position, quaternion)
+        scale = self.scales.get(name, 1.0)
+        if scale != 1.0:
+            shapes = tuple(scaled(shape, scale) for shape in shapes)
+        body = Body(name, shapes, kind, position, quaternion, anchored, marker, scale)
+        self.bodies[name] = body
+        return body
+
+    def body(self, name: str) -> Body:
+        """Return a body by name.
+
+        Raises:
+            UnknownNameError: If the world has no such body.
+        """
+        if name not in self.bodies:
+            raise UnknownNameError("body of this world", name, self.bodies)
+        return self.bodies[name]
+
+    def set_pose(self, name: str, position: Any, quaternion: Any = IDENTITY) -> None:
+        """Move a body.
+
+        Args:
+            name: Body name.
+            position: Three numbers (m, world).
+            quaternion: Four numbers, wxyz.
+
+        Raises:
+            UnknownNameError: If the world has no such body.
+            SimulationError: If there are more numbers than that, or fewer, or they are not finite,
+                or the quaternion is no rotation.
+        """
+        self.set_poses((name,), position, quaternion)
+
+    def set_poses(self, names: Iterable[str], position: Any, quaternion: Any = IDENTITY) -> None:
+        """Move several bodies to the same pose; see `set_pose`."""
+        if isinstance(names, str):
+            raise SimulationError(f"set_poses takes several names; set_pose takes one, {names!r}")
+        names = list(names)
+        pose = self._pose(", ".join(map(str, names)), position, quaternion)
+        rows = self._placements.bodies
+        for name in names:
+            rows.setdefault(self.body(name).name, {})[self._number] = pose
+
+    def stand(self, robot: str, qpos: Any) -> None:
+        """Stand a robot at its base pose, at rest.
+
+        Args:
+            robot: Its name in the layout.
+            qpos: Joint positions in the order of the descriptor's joints, (dof,) (rad, m).
+
+        Raises:
+            UnknownNameError: If the layout has no such robot.
+            SimulationError: If there are more numbers than joints, or fewer, or they are not
+                finite.
+        """
+        joints = self.layout[robot].robot.joints
+        numbers = self._floats(qpos, len(joints), f"qpos of robot {robot!r}", "rad, m")
+        self._placements.robots.setdefault(robot, {})[self._number] = np.array(numbers, float)
+
+    def _check_body(self, name: object, shapes: tuple[object, ...], kind: object) -> None:
+        if not isinstance(name, str) or not name:
+            raise SimulationError(f"a body's name is {shown(name)}; it must be a text")
+        for shape in shapes:
+            if not isinstance(shape, Shape):
+                raise SimulationError(
+                    f"body {name!r}: {shown(shape)} is no shape; shapes are Box, Sphere, Cylinder,"
+                    " Capsule, Mesh and Plane"
+                )
+        checked_choice(f"body {name!r}: kind", kind, _KINDS, SimulationError)
+
+    def _pose(self, body: str, position: Any, quaternion: Any) -> list[float]:
+        place = self._floats(position, 3, f"position of body {body!r}", "m")
+        if quaternion is IDENTITY:
+            return [*place, *IDENTITY]
+        turn = self._floats(quaternion, 4, f"quaternion of body {body!r}", "w, x, y, z")
+        what = f"quaternion of body {body!r} in environment {self._number}"
+        expect_unit(what, turn, SimulationError)
+        return [*place, *turn]
+
+    def _floats(self, values: Any, count: int, what: str, unit: str) -> list[float]:
+        try:
+            floats = values.tolist() if hasattr(values, "tolist") else [float(x) for x in values]
+            if isfinite(sum(floats)) and len(floats) == count:
+                return floats
+        except (TypeError, ValueError):  # no numbers, or several rows of them
+            pass
+        raise SimulationError(
+            f"{what} in environment {self._number} is {shown(values)}; it must be {count} finite"
+            f" numbers ({unit})"
+        )

@@ -1,0 +1,100 @@
+"""``python -m robot_layouts view``, and ``python -m tasks view --demo``, which hands over to it."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from benchmarks.teleop import served
+from robot_layouts.__main__ import main
+from robot_layouts.data.commands import episode_cell
+from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from tests.data.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record
+from tests.pages import browser_page, changed, settled
+
+STEPS = 6
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("demo") / "trajectory.h5", TWO_ROBOTS, [3, STEPS])
+
+
+def test_the_motion_is_the_recorded_one(recording):
+    with Recording(recording) as file:
+        cell = episode_cell(file, 1)
+    recorded = read(recording)[1]
+    motion = cell.motion
+    assert cell.title == "TwoRobotPickCube-v1, episode 1 of trajectory.h5"
+    assert len(motion) == STEPS + 1
+    assert motion.step_seconds == pytest.approx(1 / 20)
+    np.testing.assert_array_equal(motion.qpos["left"], recorded.qpos(LEFT_KEY))
+    np.testing.assert_array_equal(motion.poses["cube"], recorded.poses("cube"))
+    assert np.ptp(motion.qpos["right"], axis=0).max() > 0.01
+    assert {"cube", "table-workspace", "ground"} <= set(cell.things)
+
+
+@pytest.mark.long
+def test_a_file_without_states_is_played_again(recording, tmp_path):
+    path = tmp_path / "trajectory.h5"
+    for suffix in (".h5", ".json"):
+        path.with_suffix(suffix).write_bytes(recording.with_suffix(suffix).read_bytes())
+    with edited(path) as file:
+        for episode in file.values():
+            del episode["env_states"]
+    with Recording(path) as bare, Recording(recording) as whole:
+        played, recorded = episode_cell(bare, 0).motion, episode_cell(whole, 0).motion
+    for name in ("left", "right"):
+        np.testing.assert_array_equal(played.qpos[name], recorded.qpos[name])
+
+
+def test_an_episode_that_is_not_there(recording):
+    with (
+        Recording(recording) as file,
+        pytest.raises(TrajectoryError, match="has no episode 2; it has 2, from 0 to 1"),
+    ):
+        episode_cell(file, 2)
+
+
+def test_a_recording_of_another_task(recording, capsys):
+    assert main(["view", str(recording), "--task", "PickCube-v1"]) == 1
+    assert "was recorded in TwoRobotPickCube-v1, not in PickCube-v1" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_a_page_is_saved(recording, tmp_path, capsys):
+    path = tmp_path / "episode.html"
+    assert main(["view", str(recording), "--html", str(path)]) == 0
+    assert "<title>TwoRobotPickCube-v1, episode 0 of trajectory.h5</title>" in path.read_text()
+
+
+@pytest.mark.long
+def test_tasks_hand_a_demonstration_over(recording):
+    words = ("view", TWO_ROBOTS, "--demo", str(recording), "--episode", "1", "--port", "0")
+    with served("tasks", *words) as view:
+        assert view.lines[-1].startswith("TwoRobotPickCube-v1, episode 1 of trajectory.h5: http://")
+        assert view.interrupt() == (0, "ended\n")
+    other = [sys.executable, "-m", "tasks", "view", "PickCube-v1", "--demo", str(recording)]
+    done = subprocess.run(other, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "not in PickCube-v1" in done.stderr
+
+
+@pytest.mark.long
+@pytest.mark.browser
+def test_the_timeline_is_scrubbed_and_played(recording, tmp_path):
+    words = ("robot_layouts", "view", str(recording), "--episode", "1", "--port", "0")
+    with served(*words) as view, browser_page() as (page, _):
+        page.goto(view.url)
+        page.get_by_text(f"step 0 of {STEPS}, 0.00 s").wait_for()
+        start = settled(page, lambda now: changed(now, np.full_like(now, 255)) > 30000)
+        page.screenshot(path=tmp_path / "start.png")
+        step = page.get_by_role("slider").first
+        step.focus()
+        step.press("End")
+        page.get_by_text(f"step {STEPS} of {STEPS}, 0.30 s").wait_for()
+        settled(page, lambda now: changed(now, start) > 100)
+        page.screenshot(path=tmp_path / "end.png")
+        page.get_by_label("Play").click()
+        page.get_by_text(f"step 2 of {STEPS}").wait_for()
