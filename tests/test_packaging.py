@@ -56,7 +56,7 @@ class TestWheel:
         suites = {f"robot_layouts/data/suite/{name}" for name in ("suite.css", "standard.yaml")}
         templates = {
             path.relative_to(ROOT).as_posix()
-            for room in ("robots", "rollouts")
+            for room in ("robot_layouts",)
             for path in (ROOT / room).rglob("templates/*.jinja")
         }
         assert len(templates) >= 5
@@ -130,7 +130,7 @@ class TestDependencies:
         assert distributions(used - {"mujoco"}) <= declared
 
     @pytest.mark.parametrize(
-        "room", ["kinematics", "robots", "layouts", "simulation", "tasks", "rollouts"]
+        "room", ["robots", "layouts", "tasks", "robot_layouts.simulation", "robot_layouts.data"]
     )
     def test_importing_a_room_needs_no_extra(self, room):
         assert distributions(imports_of(room, everywhere=False)) <= names_of(

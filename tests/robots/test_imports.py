@@ -48,7 +48,8 @@ def run(code: str, **variables: str) -> list[str]:
 
 def test_importing_robots_and_layouts_loads_nothing_heavy_and_opens_no_socket():
     code = f"""
-import kinematics, robots, layouts
+import robots, layouts, robot_layouts
+from robot_layouts import kinematics
 print(*[name for name in {HEAVY!r} if name in sys.modules])
 print(*[event for event, path in seen if event.startswith("socket.")])
 print("ran")

@@ -97,7 +97,8 @@ def run(folder: Path, *words: str) -> str:
 
 def test_a_module_and_an_id_go_wherever_an_id_goes(mylab):
     code = (
-        "import tasks, experts, sys\n"
+        "import tasks, sys\n"
+        "from robot_layouts import experts\n"
         "assert 'mylab.tray' not in sys.modules\n"
         "env = tasks.make('mylab.tray:twoarmtray-v1', num_envs=2)\n"
         "print(env.task_id, env.num_envs, 'TwoArmTray-v1' in tasks.list_tasks())\n"
@@ -148,7 +149,8 @@ def test_an_unknown_task_says_how_to_name_one_from_outside():
 @pytest.mark.long
 def test_an_installed_package_brings_tasks_experts_and_presets(installed):
     code = (
-        "import sys, gymnasium, tasks, experts\n"
+        "import sys, gymnasium, tasks\n"
+        "from robot_layouts import experts\n"
         "from layouts.presets import PRESETS\n"
         "assert 'mylab.tray' not in sys.modules\n"
         "assert 'TwoArmTray-v1' in tasks.list_tasks()\n"
