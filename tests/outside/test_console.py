@@ -79,7 +79,7 @@ def test_files_of_the_user_hide_nothing_from_it(tmp_path):
 
 def test_a_package_that_hides_ours_is_named(tmp_path):
     folder = make_folder(tmp_path, shadows=True)
-    for module, hides in (("rollouts", "robots"), ("tasks", None)):
+    for module, hides in (("layouts", "robots"), ("tasks", None)):
         done = subprocess.run(
             [sys.executable, "-m", module, "--help"],
             cwd=folder,
