@@ -19,7 +19,7 @@ help:
 	@echo "make test      the tests"
 	@echo "make test-all  the tests, those that take minutes included"
 	@echo "make faults    whatever can go wrong, tried; writes docs/faults.md"
-	@echo "make check     lint, format, types, which room imports which, documentation, distribution"
+	@echo "make check     lint, format, types, which room imports which, sizes, documentation, distribution"
 	@echo "make docs      the documentation as a site: open site/index.html"
 	@echo "make bench     what steps, resets, vectors and plans cost, beside native ManiSkill"
 	@echo "make parity    every task beside native ManiSkill; writes docs/parity.md's table"
@@ -47,6 +47,7 @@ check: $(VENV)/.check
 	$(RUN) -m ruff format --check .
 	$(RUN) -m pyright --pythonpath $(RUN)
 	$(VENV)/bin/lint-imports
+	$(RUN) .ci/budget.py
 	$(RUN) -m parity tables --check
 	$(RUN) -m benchmarks tables --check
 	$(RUN) -m benchmarks gallery --check
