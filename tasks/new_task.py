@@ -39,7 +39,7 @@ SPREAD, ASIDE = 0.05, 0.1
 
 _TASK = '''"""{title}: every arm brings its tool centre point to a ball in the air."""
 
-{paths}from experts import register_expert
+{paths}from robot_layouts.experts import register_expert
 from robot_layouts.experts.reaching import reaching
 from robot_layouts.experts.rehearsal import first_success
 {imports}

@@ -151,7 +151,7 @@ class TestNew:
             ("9lives", "a=panda", "'9lives' cannot be the name of a task: it is made of letters"),
             ("PickCube", "a=panda", "is a task PickCube-v1 already; choose another name, such as"),
             ("Class", "a=panda", "'class' is a keyword of Python; choose another name"),
-            ("Motion", "a=panda", "'motion' is a package of this library; choose another name"),
+            ("Layouts", "a=panda", "'layouts' is a package of this library; choose another name"),
             (
                 "Json",
                 "a=panda",

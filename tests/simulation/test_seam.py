@@ -37,7 +37,7 @@ def reached(start: Any) -> Iterator[tuple[str, Any]]:
             found += [(f"{path}[{key!r}]", value) for key, value in thing.items()]
         elif isinstance(thing, list | tuple | set | frozenset):
             found += [(f"{path}[{i}]", value) for i, value in enumerate(thing)]
-        if re.match(r"(simulation\.(?!sapien3)|tasks\.)", type(thing).__module__):
+        if re.match(r"(robot_layouts\.simulation\.(?!sapien3)|tasks\.)", type(thing).__module__):
             found += list(attributes(path, thing))
 
 
