@@ -17,11 +17,11 @@ from tests.fresh_process import in_fresh_process
 
 ROOT = str(Path(__file__).resolve().parents[1])
 MOST = {
-    "make, first": 18_000,  # most of it reads URDFs
-    "make, again": 6_400,  # likewise
+    "make, first": 8_000,
+    "make, again": 3_200,
     "step": 130,
-    "plan": 20_000,
-    "search": 152_000,
+    "plan": 13_000,
+    "search": 142_000,
 }
 
 
