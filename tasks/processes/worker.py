@@ -15,7 +15,7 @@ from enum import Enum, auto
 from multiprocessing.connection import wait
 from typing import Any
 
-from tasks.processes.start import WorkerError, exit_code, start
+from tasks.processes.start import WorkerError, enough, exit_code, start
 from tasks.processes.transport import SentError, described, loaded
 
 SHUTDOWN_SECONDS = 2.0  # that a worker may take to end by itself
@@ -137,7 +137,8 @@ class Worker:
         Raises:
             ProcessError: If it cannot be started.
         """
-        self.socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with enough():
+            self.socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with closing(theirs):
             try:
                 self._process = start(_serve, theirs)

@@ -142,7 +142,7 @@ def _front(name: str) -> Any:
 def _task_of(front: Any) -> Any:
     import tasks
 
-    if isinstance(front, tasks.MultiRobotTask):
+    if isinstance(front, tasks.TaskEnv):
         return front
     front = getattr(front, "unwrapped", front)
     if hasattr(front, "vector"):

@@ -17,7 +17,7 @@ from tests.faults.toy_robots import toy
 AREA = "generators"
 TASK_NAMES = {
     "is taken by a task": "PickCube",
-    "is that of a package of this library, as a module": "Motion",
+    "is that of a package of this library, as a module": "Layouts",
     "is that of a module of Python": "Random",
     "is that of an installed package": "Torch",
     "is a keyword of Python, as a module": "Class",

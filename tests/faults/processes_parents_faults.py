@@ -175,7 +175,7 @@ MAINS = {
         "if __name__ == '__main__':\n"
         "    tasks.register_task('Mine-v1')(mine())\n"
         "    gymnasium.make_vec('RobotLayouts/Mine-v1', num_envs=2, num_workers=2)\n",
-        "define it in a module that they can import",
+        "defined in a module that they can import",
     ),
 }
 

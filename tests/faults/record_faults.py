@@ -49,7 +49,6 @@ DAMAGED_TEXTS: dict[str, bytes] = {
 }
 PLACES: dict[str, Callable[[Path], object]] = {
     "a FIFO": os.mkfifo,
-    "a directory": lambda path: (path / "inside").mkdir(parents=True),
     "a link to itself": lambda path: path.symlink_to(path),
     "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
     "a link to /etc/passwd": lambda path: path.symlink_to("/etc/passwd"),
@@ -78,7 +77,6 @@ def _entries_of_records() -> Iterator[Fault]:
         less = {name: value for name, value in right.items() if name != field}
         yield _of_record(f"no {field}", _record({str(MESH): less}))
     yield _of_record("an unknown field", _record({str(MESH): {**right, "extra": 1}}))
-    yield Fault(AREA, "fetched.json: one entry of many is wrong", _one_of_many, GOES_ON)
     yield Fault(AREA, "fetched.json: trusts other bytes than are there", _other_trust, GOES_ON)
 
 
@@ -100,16 +98,6 @@ def _of_record(what: str, put: Callable[[Path], object]) -> Fault:
         return "set aside, and written anew; every file is there and right"
 
     return Fault(AREA, f"fetched.json: {what}", run, GOES_ON)
-
-
-def _one_of_many(folder: Path) -> None:
-    store = fill(AssetStore(folder / "assets"))
-    right = {"source": "a friend", "sha256": MESH.sha256, "trusted": False}
-    _record({"a/b": right, "c/d": 5})(store.root / "fetched.json")
-    store.path(MESH).unlink()
-    fetch(store, [another_copy(folder)])
-    record = json.loads((store.root / "fetched.json").read_text())
-    assert record.keys() == {"a/b", str(MESH)}
 
 
 def _other_trust(folder: Path) -> None:

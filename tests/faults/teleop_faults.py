@@ -78,7 +78,7 @@ def faults() -> Iterator[Fault]:
 
 
 @cache
-def _task() -> tasks.MultiRobotTask:
+def _task() -> tasks.TaskEnv:
     return tasks.make("PickCube-v1")
 
 
