@@ -26,7 +26,7 @@ def evaluate(
 ) -> None:
     """Let a policy or an expert play episodes, and print how well it does.
 
-    A policy maps an observation to an action; see rollouts.evaluate. Exit code: 0 if all was
+    A policy maps an observation to an action; see robot_layouts.evaluate. Exit code: 0 if all was
     played, 1 if not, 2 for bad usage, 130 if interrupted.
 
     Args:

@@ -17,7 +17,7 @@ ROOMS = {
     "robots": "robots.inspect panda --help",
     "layouts": "layouts --help",
     "tasks": "tasks --help",
-    "rollouts": "rollouts record --help",
+    "robot_layouts": "robot_layouts record --help",
 }
 
 

@@ -58,7 +58,8 @@ def record(
 
     The same command goes on where it was stopped or killed. Exit code: 0 if every episode was
     recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an
-    action; see rollouts.record. Episodes of other seeds may come from others: each says who acted.
+    action; see robot_layouts.record. Episodes of other seeds may come from others: each says who
+    acted.
 
     Args:
         task: Task id; MODULE:ID for one of your own.
