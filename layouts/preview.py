@@ -12,10 +12,11 @@ import numpy as np
 
 from layouts.description import action_text, decimal, facing_text, headline
 from layouts.frames import table_outlines
+from robot_layouts.core.figures import COLOURS, FAINT, INK, SUPPORTED, blank_figure
 from robot_layouts.core.quoting import cut
 from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import forward, yaw_degrees
-from robots import LayoutError, MissingPackageError
+from robots import LayoutError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,15 +27,9 @@ if TYPE_CHECKING:
 
 Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
 
-SUPPORTED = (".png", ".pdf", ".svg")
-
-# Okabe and Ito's colours, told apart with any kind of colour vision, darkest first; then two of
-# Paul Tol's.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255", "#999933")
-INK, FAINT, TABLE = "#2B2B2B", "#8A8A8A", "#EFE6D8"
+TABLE = "#EFE6D8"
 
 WIDTH = 8.0  # inches; 1200 pixels
-DOTS_PER_INCH = 150
 LEFT, RIGHT, ABOVE, BELOW = 0.75, 0.25, 0.5, 0.7  # around the plan (inches)
 MARGIN = 0.06  # free space on each side of the robots, in shares of the plan's larger side
 HEADING = 0.085  # length of the arrows, in the same shares
@@ -79,28 +74,6 @@ def preview(
     with written_whole(target) as unfinished:
         figure.savefig(unfinished, format=target.suffix[1:].lower())
     return target
-
-
-def blank_figure(
-    what: str, size: tuple[float, float], dots_per_inch: int = DOTS_PER_INCH
-) -> Figure:
-    """Return a white figure to draw on.
-
-    Args:
-        what: What it becomes, in words.
-        size: Width and height (inches).
-        dots_per_inch: Resolution.
-
-    Raises:
-        MissingPackageError: If matplotlib is not installed.
-    """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingPackageError(
-            f"{what} needs matplotlib: pip install 'robot-layouts[preview]'"
-        ) from error
-    return Figure(figsize=size, dpi=dots_per_inch, facecolor="white")
 
 
 def draw(layout: Arrangement, table: Rectangle | None = None) -> Figure:

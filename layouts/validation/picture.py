@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from layouts.description import decimal, headline
-from layouts.preview import COLOURS, FAINT, INK, LONGEST_NAME, SUPPORTED, TABLE, blank_figure
+from layouts.preview import LONGEST_NAME, TABLE
 from layouts.validation.findings import Clearance, Results, length_text
+from robot_layouts.core.figures import COLOURS, FAINT, INK, SUPPORTED, blank_figure
 from robot_layouts.core.quoting import cut
 from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.rotations import Floats

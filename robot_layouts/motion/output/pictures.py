@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from layouts.description import decimal
-from layouts.preview import COLOURS, FAINT, INK, SUPPORTED, TABLE, blank_figure
+from layouts.preview import TABLE
 from layouts.validation.findings import length_text
 from robot_layouts.core.errors import MotionError
+from robot_layouts.core.figures import COLOURS, FAINT, INK, SUPPORTED, blank_figure
 from robot_layouts.core.progress import Progress
 from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import forward

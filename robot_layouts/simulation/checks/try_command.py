@@ -1,11 +1,12 @@
-"""``robot-layouts robots inspect``, whose ``--try`` prints how a robot stands and moves."""
+"""``robot-layouts robots inspect``, which also draws robots and tries them in physics."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
 
-from robot_layouts.core.cli import Word
+from robot_layouts.core.cli import File, Word
+from robot_layouts.core.errors import DescriptorError
 from robot_layouts.simulation.checks.trial import (
     HELD,
     Fastest,
@@ -17,6 +18,7 @@ from robot_layouts.simulation.checks.trial import (
 )
 from robots import inspect as reports
 from robots.named import FORMS, named_robot
+from robots.picture import save_picture
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -28,21 +30,31 @@ WIDTH = 120  # characters of a table, at least
 
 
 def inspect(
-    robots: Sequence[Annotated[str, Word("ROBOT", about=FORMS)]], *, try_: bool = False
+    robots: Sequence[Annotated[str, Word("ROBOT", about=FORMS)]],
+    *,
+    picture: File | None = None,
+    try_: bool = False,
 ) -> int:
-    """Print everything about robots, or try them in physics.
+    """Print everything about robots, or draw one, or try them in physics.
 
     Exit code: 0, or 1 if a robot that is tried does not work, or 2 for bad usage.
 
     Args:
         robots: The robots.
+        picture: Save a picture of the robot (.png, .pdf, .svg): its limbs at rest, its front, its
+            TCP, its gripper open and closed, and what to change if something is wrong.
         try_: Stand the robots, step them and move them in physics, and print what was seen.
 
     Raises:
-        RobotLayoutsError: If a robot does not exist, or cannot be read or built.
+        RobotLayoutsError: If a robot does not exist, or cannot be read, drawn or built.
     """
-    if not try_:
+    if picture is not None:
+        if len(robots) > 1:
+            raise DescriptorError(f"--picture draws one robot at a time; {len(robots)} are given")
+        print(f"picture: {save_picture(named_robot(robots[0]), picture)}")
+    elif not try_:
         reports.inspect(robots)
+    if not try_:
         return 0
     from rich.console import Console
 
