@@ -36,6 +36,8 @@ FEW = [
 
 @pytest.mark.long
 def test_what_depends_on_the_processor_is_seen():
+    if "GenuineIntel" not in Path("/proc/cpuinfo").read_text():
+        pytest.skip("MKL computes differently by choice on Intel's processors alone")
     one = play_under(settings()[PLAIN], FEW)
     other = play_under(settings()["MKL, any"], FEW)
     found = differences(FEW, one, other)
