@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,7 +18,14 @@ from robot_layouts.kinematics.rotations import Floats
 from robots.guessing.hints import Hints
 from robots.mjcf.couplings import Couplings, find_couplings
 from robots.mjcf.reading import MjcfText, Model, compiled, name_of, read_mjcf
-from robots.mjcf.robot import MjcfRobot, dry_friction, find_drives, find_efforts, find_robot
+from robots.mjcf.robot import (
+    HINGE,
+    MjcfRobot,
+    dry_friction,
+    find_drives,
+    find_efforts,
+    find_robot,
+)
 from robots.mjcf.to_urdf import excluded, write_urdf
 
 FORM = 1  # of what is made of an MJCF; counted up whenever that changes
@@ -81,12 +90,12 @@ def locate(path: Path) -> Path:
 
 @lru_cache(maxsize=KEPT)
 def _convert(path: Path, text: MjcfText) -> Converted:
-    model = compiled(text, path)
+    model, mended = compiled(text, path)
     robot = find_robot(model, path)
     couplings = find_couplings(robot, path)
     urdf = write_urdf(robot, couplings, find_efforts(robot), text.name)
     rubbing = dry_friction(robot)
-    notes = [*robot.notes, *couplings.notes, *urdf.notes]
+    notes = [*_doubtful(robot), *mended, *robot.notes, *couplings.notes, *urdf.notes]
     if rubbing:
         notes.append(
             f"dry friction of {', '.join(rubbing)} is left out: PhysX has none in N·m or N"
@@ -101,6 +110,18 @@ def _convert(path: Path, text: MjcfText) -> Converted:
         reasons=tuple(f"MJCF: {note}" for note in notes),
     )
     return Converted(text.name, urdf.xml, urdf.meshes, hints, urdf.frames)
+
+
+def _doubtful(robot: MjcfRobot) -> Iterator[str]:
+    """Yield that ranges are those of radians, which were read as degrees, if they look like it."""
+    model = robot.model
+    hinges = [j for j in robot.moving if model.jnt_type[j] == HINGE and model.jnt_limited[j]]
+    widest = max((float(np.ptp(model.jnt_range[joint])) for joint in hinges), default=math.inf)
+    if widest < math.radians(2 * math.pi):
+        yield (
+            f"no hinge turns by more than {math.degrees(widest):.2g}°, so the ranges seem to be in"
+            ' radians, and are read as degrees: write <compiler angle="radian"/> into the MJCF'
+        )
 
 
 def _postures(model: Model, robot: MjcfRobot, couplings: Couplings) -> dict[str, dict[str, float]]:

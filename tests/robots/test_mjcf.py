@@ -28,6 +28,11 @@ from robots.urdf.summary import read_urdf
 
 from .mjcf_parts import JAWS, arm, mjcf, motors, write
 
+DRAWN = 'contype="0" conaffinity="0"'
+CRUMB = trimesh.creation.box((1e-6, 1e-6, 1e-6))
+SHEET = trimesh.creation.box((0.1, 0.1, 0.0))
+TRIANGLE = trimesh.Trimesh(np.eye(3), [[0, 1, 2]])
+
 
 @pytest.fixture(autouse=True)
 def _local_copy(tmp_path_factory, monkeypatch):
@@ -98,6 +103,34 @@ class TestWhatIsGuessed:
     def test_a_base_that_flies_is_fixed(self, tmp_path):
         path = write(tmp_path, mjcf(arm(inside='<freejoint name="fly"/>')))
         assert "'fly', by which the whole robot flies freely, is fixed" in reasons(path)
+
+    def test_ranges_of_radians_that_are_read_as_degrees_are_doubted(self, tmp_path):
+        tiny = arm().replace('range="-100 100"', 'range="-1.7 1.7"')
+        about = reasons(write(tmp_path, mjcf(tiny)))
+        assert "no hinge turns by more than 3.4°, so the ranges seem to be in radians" in about
+        assert "seem to be in radians" not in reasons(write(tmp_path, mjcf(arm())))
+
+    @pytest.mark.parametrize(
+        ("lid", "use", "what"),
+        [
+            (CRUMB, "", "the mesh 'lid' has no volume, so it is a shell"),
+            (SHEET, DRAWN, "the mesh 'lid' has no volume, so it is a shell"),
+            (TRIANGLE, DRAWN, "left out: the mesh 'lid', which is only drawn"),
+            (SHEET, "", None),
+            (TRIANGLE, "", None),
+        ],
+    )
+    def test_a_mesh_that_is_too_thin(self, lid, use, what, tmp_path):
+        lid.export(tmp_path / "lid.obj")
+        geom = f'<geom type="mesh" mesh="lid" {use}/>'
+        path = write(tmp_path, mjcf(arm(inside=geom), '<asset><mesh file="lid.obj"/></asset>'))
+        if what is None:
+            with pytest.raises(AssetError, match="MuJoCo cannot compile"):
+                guess_descriptor(path)
+        else:
+            assert what in reasons(path)
+            kept = [] if what.startswith("left out") else ["mesh"]
+            assert [shape.kind for shape in urdf_of(path).visuals["base"]] == [*kept, "box"]
 
     def test_two_arms_are_limbs(self, tmp_path):
         both = arm("left_", at="0 0.4 0") + arm("right_", at="0 -0.4 0")

@@ -7,6 +7,7 @@ keeps every byte.
 
 from __future__ import annotations
 
+import posixpath
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -21,6 +22,7 @@ from robots.urdf.cleaning.joints import repair_joints
 from robots.urdf.cleaning.references import file_states, repair_references
 from robots.urdf.cleaning.shapes import repair_shapes
 from robots.urdf.cleaning.xacro_files import drop_leftovers, is_unfinished
+from robots.urdf.paths import opened_folders
 from robots.urdf.text import parse_xml
 
 PARTS = ("link", "joint", "material")  # of a robot; the rest belongs to other programs
@@ -54,7 +56,8 @@ def clean(xml: bytes, urdf: str) -> Cleaned:
         AssetError: If it is no XML.
     """
     _, references = _first_look(xml, urdf)
-    return _clean(xml, urdf, file_states(references, urdf))
+    opened = opened_folders(posixpath.dirname(urdf))
+    return _clean(xml, urdf, (file_states(references, urdf), opened))
 
 
 def is_template(xml: bytes, urdf: str) -> bool:

@@ -158,7 +158,8 @@ class _Lost:
         there = "is" if "," not in named else "are"
         return (
             f"; the package {named} {there} not there: put it beside {template.name} or beside its"
-            " package, in a folder of that name or with its package.xml"
+            " package, in a folder of that name or with its package.xml, or name the folder that it"
+            " lies in: folder=… (--folder DIR)"
         )
 
 
