@@ -10,6 +10,7 @@ import hashlib
 import os
 import posixpath
 import re
+import warnings
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -247,7 +248,9 @@ def without_log() -> Generator[None]:
     library = mujoco()
     library.set_mju_user_warning(lambda warning: None)  # what is wrong is an error
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     finally:
         library.set_mju_user_warning(None)
 
