@@ -115,12 +115,18 @@ class TestGrippers:
         _, after = stepped(arm, closing, 20)
         assert (after[-2:] < 0.005).all()
 
-    def test_a_gripper_that_is_built_in_stays(self):
-        with pytest.raises(
-            DescriptorError,
-            match="so100 cannot be taken off: no fixed joint",
-        ):
-            with_gripper(RobotRegistry.load("so100"), "panda")
+    def test_fingers_that_hang_on_the_last_link_of_the_arm_are_cut_off(self):
+        own = RobotRegistry.load("so100")
+        arm = with_gripper(own, "panda")
+        gone = set(model_of(own).links) - set(model_of(arm).links)
+        assert gone == {"Moving_Jaw", "Moving_Jaw_tip"}
+        assert model_of(arm).parent_joint["panda_hand"].parent == "Fixed_Jaw"
+        assert arm.joints == (*own.arm_joints, "panda_finger_joint1", "panda_finger_joint2")
+        assert arm.fingers.links == ("panda_leftfinger", "panda_rightfinger")
+
+    def test_fingers_that_hang_on_an_arm_are_not_lent(self):
+        with pytest.raises(DescriptorError, match="so100 cannot lend its gripper: no fixed joint"):
+            with_gripper(PANDA, "so100")
 
     def test_an_arm_that_has_none_lends_none(self):
         with pytest.raises(DescriptorError, match="panda_stick is an arm, and none of its"):
