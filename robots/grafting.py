@@ -75,8 +75,8 @@ def with_gripper(
 ) -> RobotDescriptor:
     """Return an arm with another gripper in the place of its own, if it has one.
 
-    A gripper is cut off at the last fixed joint before it. Fingers that hang on the last link of the
-    arm itself are cut off alone, and the housing in that link stays.
+    A gripper is cut off at the last fixed joint before it. Fingers that hang on the last link of
+    the arm itself are cut off alone, and the housing in that link stays.
 
     Args:
         robot: The arm.
