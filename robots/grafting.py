@@ -19,7 +19,7 @@ import numpy as np
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
 from robots.action_split import ActionSplit, JointGroup
-from robots.assets.assembled import AssembledUrdf, Part, carried_by
+from robots.assets.assembled import AssembledUrdf, UrdfPart, carried_by
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.bodies.overlaps import guess_allowed
 from robots.control_modes import CONTROL_MODES
@@ -110,7 +110,7 @@ def with_gripper(
             without, mount = _fingers(robot, model, present)
     if link is not None:
         mount, origin = link, np.eye(4)
-    part = Part(
+    part = UrdfPart(
         tool.urdf,
         mount,
         _vector(origin) if position is None else position,
@@ -154,7 +154,7 @@ def with_tool(
         )
     if tcp_link not in model.links:
         raise UnknownNameError("link of the tool", tcp_link, model.links)
-    part = Part(source, link or robot.tcp_link, position, quaternion)
+    part = UrdfPart(source, link or robot.tcp_link, position, quaternion)
     part = _apart(part, robot)
     urdf = AssembledUrdf(robot.urdf, (part,))
     tcp: dict[str, Any] = {
@@ -219,7 +219,7 @@ def on_body(
     for key, robot in robots.items():
         _refuse_limbs(robot, f"stand on a body as {key!r}")
     parts = [
-        Part(robots[key].urdf, m.link or model.root, m.position, m.quaternion, prefix=f"{key}_")
+        UrdfPart(robots[key].urdf, m.link or model.root, m.position, m.quaternion, prefix=f"{key}_")
         for key, m in mounts.items()
     ]
     urdf = AssembledUrdf(source, tuple(parts))
@@ -256,7 +256,7 @@ def _refuse_limbs(robot: RobotDescriptor, what: str) -> None:
 
 
 def _limbs(
-    robots: Mapping[str, RobotDescriptor], body: UrdfModel, parts: Sequence[Part]
+    robots: Mapping[str, RobotDescriptor], body: UrdfModel, parts: Sequence[UrdfPart]
 ) -> dict[str, Limb]:
     """Return robots, as they are named on a body, as the limbs of one robot."""
     tree = kinematic_tree(body)
@@ -376,7 +376,11 @@ def _fingers(
 
 
 def _with_part(
-    robot: RobotDescriptor, tool: RobotDescriptor, part: Part, without: tuple[str, ...], name: str
+    robot: RobotDescriptor,
+    tool: RobotDescriptor,
+    part: UrdfPart,
+    without: tuple[str, ...],
+    name: str,
 ) -> RobotDescriptor:
     part = _apart(part, robot, without)
     urdf = AssembledUrdf(robot.urdf, (part,), without)
@@ -410,7 +414,7 @@ def _with_part(
     return replace(made, reach=_reach(robot, made))
 
 
-def _apart(part: Part, robot: RobotDescriptor, without: Sequence[str] = ()) -> Part:
+def _apart(part: UrdfPart, robot: RobotDescriptor, without: Sequence[str] = ()) -> UrdfPart:
     """Return a part with a prefix, if it has a name that is left of the robot."""
     body, tool = _model(robot.urdf), _model(part.urdf)
     kept = _names(body, {*body.links} - carried_by(body, without))

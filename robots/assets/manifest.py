@@ -137,7 +137,7 @@ class AssetPackage:
 
 
 @dataclass(frozen=True)
-class Manifest:
+class AssetManifest:
     """Every package of robot files, by name."""
 
     packages: Mapping[str, AssetPackage]
@@ -158,7 +158,7 @@ class Manifest:
         return json.dumps({"packages": packages}, indent=1) + "\n"
 
     @classmethod
-    def from_json(cls, text: str) -> Manifest:
+    def from_json(cls, text: str) -> AssetManifest:
         """Read what `to_json` wrote; it is ours, and a test checks what it holds.
 
         Raises:
@@ -169,7 +169,7 @@ class Manifest:
 
 
 @lru_cache(maxsize=1)
-def load_manifest() -> Manifest:
+def load_manifest() -> AssetManifest:
     """Return the manifest of this checkout, or of this installation.
 
     Raises:
@@ -184,7 +184,7 @@ def load_manifest() -> Manifest:
             " robot-layouts again"
         )
     try:
-        return Manifest.from_json(read_text(path, _LARGEST_MANIFEST))
+        return AssetManifest.from_json(read_text(path, _LARGEST_MANIFEST))
     except UnreadableFileError as error:
         raise AssetError(f"{error}; install robot-layouts again") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:

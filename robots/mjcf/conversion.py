@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from robot_layouts.core.errors import UnwritableFileError
 from robot_layouts.core.paths import default_root
-from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.rotations import Floats
+from robots.assets.assembled import write_folder
 from robots.guessing.hints import Hints
 from robots.mjcf.couplings import Couplings, find_couplings
 from robots.mjcf.reading import MjcfText, Model, compiled, name_of, read_mjcf
@@ -84,7 +83,8 @@ def locate(path: Path) -> Path:
     folder = default_root() / "mjcf" / hashlib.sha256(key.encode()).hexdigest()[:16]
     urdf = folder / f"{path.stem}.urdf"
     if not urdf.is_file():
-        _write(folder, urdf.name, _convert(path, text))
+        made = _convert(path, text)
+        write_folder(folder, {**made.meshes, urdf.name: made.xml})
     return urdf
 
 
@@ -135,16 +135,3 @@ def _postures(model: Model, robot: MjcfRobot, couplings: Couplings) -> dict[str,
             if joint not in couplings.fixed
         }
     return {name: at for name, at in postures.items() if np.isfinite(list(at.values())).all()}
-
-
-def _write(folder: Path, name: str, converted: Converted) -> None:
-    """Make the folder of a URDF, unless another process is faster."""
-    try:
-        with written_whole(folder) as unfinished:
-            unfinished.mkdir(parents=True)
-            for mesh, contents in converted.meshes.items():
-                (unfinished / mesh).write_bytes(contents)
-            (unfinished / name).write_bytes(converted.xml)
-    except UnwritableFileError:
-        if not (folder / name).is_file():
-            raise

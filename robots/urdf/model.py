@@ -42,7 +42,7 @@ class UrdfShape:
 
 
 @dataclass(frozen=True, eq=False)
-class Inertial:
+class LinkInertia:
     """What a link weighs.
 
     Attributes:
@@ -126,7 +126,7 @@ class UrdfModel:
     joints: tuple[ModelJoint, ...]
     collisions: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
     visuals: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
-    inertials: Mapping[str, Inertial] = field(default_factory=dict)
+    inertials: Mapping[str, LinkInertia] = field(default_factory=dict)
 
     @cached_property
     def parent_joint(self) -> dict[str, ModelJoint]:

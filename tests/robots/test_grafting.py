@@ -13,7 +13,7 @@ from robot_layouts.core.errors import UnwritableFileError
 from robot_layouts.kinematics.rotations import pose_matrix
 from robot_layouts.simulation import Simulation
 from robots import CameraMount, DescriptorError, RobotRegistry, UnknownNameError
-from robots.assets.assembled import AssembledUrdf, Part
+from robots.assets.assembled import AssembledUrdf, UrdfPart
 from robots.assets.locator import LocalUrdf
 from robots.grafting import Mount, on_body, with_camera, with_gripper, with_tool
 from robots.urdf.reading import read_model
@@ -241,7 +241,7 @@ class TestArmsOnABody:
 
 class TestFiles:
     def test_the_same_parts_make_the_same_file(self, pen, tmp_path):
-        urdf = AssembledUrdf(PANDA.urdf, (Part(LocalUrdf(pen), "panda_hand"),))
+        urdf = AssembledUrdf(PANDA.urdf, (UrdfPart(LocalUrdf(pen), "panda_hand"),))
         first = urdf.locate()
         assert pickle.loads(pickle.dumps(urdf)).locate() == first
         pen.write_text(PEN.replace("0.2", "0.3"))
@@ -258,7 +258,7 @@ class TestFiles:
             "from robots.assets import assembled; from pathlib import Path;"
             "assembled.default_root = lambda: Path(sys.argv[2]);"
             "panda = RobotRegistry.load('panda');"
-            "part = assembled.Part(LocalUrdf(sys.argv[1]), 'panda_hand');"
+            "part = assembled.UrdfPart(LocalUrdf(sys.argv[1]), 'panda_hand');"
             "print(assembled.AssembledUrdf(panda.urdf, (part,)).locate())"
         )
         words = [sys.executable, "-c", code, str(pen), str(tmp_path / "shared")]
@@ -271,10 +271,10 @@ class TestFiles:
     def test_a_folder_that_cannot_be_written(self, pen, tmp_path):
         (tmp_path / "cache").write_text("a file")
         with pytest.raises(UnwritableFileError, match="cannot write .*cache/assembled"):
-            AssembledUrdf(PANDA.urdf, (Part(LocalUrdf(pen), "panda_hand"),)).locate()
+            AssembledUrdf(PANDA.urdf, (UrdfPart(LocalUrdf(pen), "panda_hand"),)).locate()
 
     def test_names_that_are_there_twice(self, pen):
-        part = Part(LocalUrdf(pen), "panda_hand")
+        part = UrdfPart(LocalUrdf(pen), "panda_hand")
         with pytest.raises(DescriptorError, match="has a link 'shaft', and so has"):
             AssembledUrdf(PANDA.urdf, (part, part)).locate()
         with pytest.raises(DescriptorError, match="nothing is left without 'panda_link0'"):
