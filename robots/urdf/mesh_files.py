@@ -61,7 +61,12 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
     """
     import trimesh  # which takes half a second to load
 
-    ending = _ending(path, where)
+    ending = posixpath.splitext(path)[1].lower()
+    if ending not in ENDINGS:
+        raise AssetError(
+            f"{where}: the mesh {path} ends in {ending or 'nothing'}; meshes end in"
+            f" {', '.join(ENDINGS)}"
+        )
     contents = _read(path, where)
     beside: Any = _SideFiles(path, urdf, where)
     beside.expect_allowed(ending, contents)
@@ -186,16 +191,6 @@ def has_volume(corners: Floats) -> bool:
     spread = corners - corners.mean(axis=0)
     _, directions = np.linalg.eigh(spread.T @ spread)
     return bool(np.ptp(spread @ directions[:, 0]) >= SMALLEST)
-
-
-def _ending(path: str, where: str) -> str:
-    ending = posixpath.splitext(path)[1].lower()
-    if ending not in ENDINGS:
-        raise AssetError(
-            f"{where}: the mesh {path} ends in {ending or 'nothing'}; meshes end in"
-            f" {', '.join(ENDINGS)}"
-        )
-    return ending
 
 
 def _read(path: str, where: str) -> bytes:

@@ -151,14 +151,6 @@ class UrdfModel:
         return carried
 
     @cached_property
-    def _fixed_on(self) -> dict[str, list[str]]:
-        fixed: dict[str, list[str]] = {}
-        for joint in self.joints:
-            if not joint.moves:
-                fixed.setdefault(joint.parent, []).append(joint.child)
-        return fixed
-
-    @cached_property
     def ordered(self) -> tuple[ModelJoint, ...]:
         """All joints, depth first from the root: each after the one that carries its parent."""
         found: list[ModelJoint] = []
@@ -184,7 +176,7 @@ class UrdfModel:
         """Return a link and all that hangs on it by fixed joints, nearest first."""
         found = [link]
         for near in found:
-            found += self._fixed_on.get(near, ())
+            found += [joint.child for joint in self._carried.get(near, ()) if not joint.moves]
         return tuple(found)
 
     def moving_on(self, link: str) -> tuple[ModelJoint, ...]:

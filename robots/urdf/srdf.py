@@ -127,8 +127,10 @@ class _Reading:
         joints = {joint for part in parts for joint in self.group(part, (*inside, name)).joints}
         tips: list[str] = []
         for chain in element.iterfind("chain"):
-            tips.append(self._link(chain.get("tip_link", "")))
-            joints |= self._chain(self._link(chain.get("base_link", "")), tips[-1])
+            base, tip = (self._link(chain.get(end, "")) for end in ("base_link", "tip_link"))
+            ways = [{joint.name for joint in self._model.path_to(link)} for link in (base, tip)]
+            joints |= ways[0] ^ ways[1]
+            tips.append(tip)
         for joint in element.iterfind("joint"):
             joints.add(self._known(joint.get("name", ""), "joint", self._joints))
         for link in element.iterfind("link"):
@@ -158,10 +160,6 @@ class _Reading:
                     states.setdefault(name, {})[known] = value
         moving = {joint.name for joint in self._model.moving}
         return {n: {j: x for j, x in at.items() if j in moving} for n, at in states.items() if n}
-
-    def _chain(self, base: str, tip: str) -> set[str]:
-        ways = [{joint.name for joint in self._model.path_to(link)} for link in (base, tip)]
-        return ways[0] ^ ways[1]
 
     def _link(self, name: str) -> str:
         return self._known(name, "link", self._model.links)

@@ -132,6 +132,18 @@ class TestWhatIsGuessed:
             kept = [] if what.startswith("left out") else ["mesh"]
             assert [shape.kind for shape in urdf_of(path).visuals["base"]] == [*kept, "box"]
 
+    def test_what_lies_elsewhere_is_read_from_a_folder_that_is_named(self, tmp_path, capsys):
+        far, own = tmp_path / "far", tmp_path / "own"
+        far.mkdir(), own.mkdir()
+        trimesh.creation.box((0.2, 0.1, 0.06)).export(far / "box.stl")
+        assets = '<asset><mesh file="../far/box.stl"/></asset>'
+        path = write(own, mjcf(arm(inside='<geom type="mesh" mesh="box"/>'), assets))
+        with pytest.raises(AssetError, match=r"leads out of .* folder=… \(--folder DIR\)"):
+            guess_descriptor(path)
+        assert main([str(path), "--folder", str(far)]) == 0
+        robot = RobotDescriptor.from_mjcf(path, quiet=True, folder=far)
+        assert robot.urdf == LocalMjcf(str(path), str(far))
+
     def test_two_arms_are_limbs(self, tmp_path):
         both = arm("left_", at="0 0.4 0") + arm("right_", at="0 -0.4 0")
         robot = guess_descriptor(write(tmp_path, mjcf(both))).descriptor
