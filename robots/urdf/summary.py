@@ -106,7 +106,7 @@ def read_references(xml: bytes, urdf: str, exists: Exists = lambda path: False) 
             `robots.urdf.paths`.
     """
     found = {
-        kind: {resolve(file, urdf, exists) for file in files}
+        kind: {resolve(file, urdf, exists) for file in sorted(files)}
         for kind, files in _named_files(xml, urdf).items()
     }
     return UrdfReferences(

@@ -153,8 +153,8 @@ def _repair_joints(root: Element, urdf: str) -> Iterator[str]:
     joints = root.findall("joint")
     yield from _fix_base(joints)
     for joint in joints:
-        where = f"{urdf}: joint {joint.get('name')!r}"
-        if joint.get("type") in BOUNDED and _is_shut(joint.find("limit"), where):
+        bounded = joint.get("type") in BOUNDED and joint.find("limit") is not None
+        if bounded and _limits(joint, urdf) == (0.0, 0.0):
             _fix(joint)
             yield (
                 f"joint {joint.get('name')!r} has the limits 0 … 0, which are those of a <limit>"
@@ -184,11 +184,11 @@ def _fix_base(joints: list[Element]) -> Iterator[str]:
             )
 
 
-def _is_shut(limit: Element | None, where: str) -> bool:
-    """Tell whether both limits are 0, which they are by the standard if they are left out."""
-    if limit is None:
-        return False
-    return all(numbers_of(limit, key, (0.0,), where) == (0.0,) for key in ("lower", "upper"))
+def _limits(joint: Element, urdf: str) -> tuple[float, float]:
+    """Return both limits of a joint, which by the standard are 0 where they are left out."""
+    where, limit = f"{urdf}: joint {joint.get('name')!r}", joint.find("limit")
+    (low,), (high,) = (numbers_of(limit, key, (0.0,), where) for key in ("lower", "upper"))
+    return low, high
 
 
 def _without_limits(joint: Element) -> Iterator[str]:
@@ -249,8 +249,7 @@ def _span(joint: Element | None, urdf: str) -> tuple[float, float] | None:
     """Return the limits of a joint that has two different ones."""
     if joint is None or joint.get("type") not in BOUNDED:
         return None
-    where, limit = f"{urdf}: joint {joint.get('name')!r}", joint.find("limit")
-    low, high = (numbers_of(limit, key, (0.0,), where)[0] for key in ("lower", "upper"))
+    low, high = _limits(joint, urdf)
     return (low, high) if low < high else None
 
 
