@@ -57,7 +57,7 @@ def repair_references(root: Element, urdf: str) -> Iterator[str]:
         urdf: Its path; one that is relative refers to nothing on this machine.
     """
     repaired: dict[str, str] = {}
-    packages = cache(lambda name: [*_packages(name, posixpath.dirname(urdf))])
+    packages = cache(lambda name: _packages(name, posixpath.dirname(urdf)))
     for element in (*root.iter("mesh"), *root.iter("texture")):
         reference = element.get("filename", "")
         if reference.strip() and posixpath.isabs(urdf) and not _leads(reference, urdf):
@@ -81,7 +81,7 @@ def find_package(name: str, folder: str) -> str:
         folder: Absolute path.
     """
     named = (f"{parent}/{name}" for parent in _holders(folder))
-    return next(_packages(name, folder), "") or next(filter(os.path.isdir, named), "")
+    return next(chain(_packages(name, folder), filter(os.path.isdir, named)), "")
 
 
 def package_of(reference: str) -> str:
@@ -155,19 +155,21 @@ def _holders(folder: str) -> list[str]:
     return [folder, *parents(folder)[:-1], *opened, *map(posixpath.dirname, opened)]
 
 
-def _packages(name: str, folder: str) -> Iterator[str]:
-    """Yield the folders whose package.xml has a name.
+def _packages(name: str, folder: str) -> list[str]:
+    """Return the folders whose package.xml has a name.
 
-    They lie around a folder, in it, near its package, in its workspace or in what was opened to it.
-    The package is the nearest folder around with a package.xml; where there is none, the folder.
+    They lie around a folder, in it or near its package; else in its workspace, or in what was
+    opened to it. The package is the nearest folder around with a package.xml; where there is none,
+    the folder.
     """
     around = [folder, *parents(folder)]
     own = [parent for parent in around if os.path.isfile(f"{parent}/package.xml")]
     beside = own[0] if own else folder
-    workspaces = [parent for parent in around if is_workspace(parent, os.path.exists)]
     near = (_below(place, 1) for place in (folder, beside, posixpath.dirname(beside)))
+    workspaces = [parent for parent in around if is_workspace(parent, os.path.exists)]
     far = (_below(place, DEEPEST_PACKAGE) for place in (*workspaces, *opened_folders(folder)))
-    yield from (place for place in chain(own, *near, *far) if _package_name(place) == name)
+    found = [place for place in chain(own, *near) if _package_name(place) == name]
+    return found or [place for place in chain(*far) if _package_name(place) == name]
 
 
 def _below(folder: str, levels: int) -> Iterator[str]:
