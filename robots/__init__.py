@@ -86,11 +86,12 @@ def _from_urdf(
     quiet: bool = False,
     xacro: Mapping[str, object] | None = None,
     srdf: str | os.PathLike[str] | None = None,
+    folder: str | os.PathLike[str] | None = None,
     **overrides: Any,
 ) -> RobotDescriptor:
     from robots.from_urdf import guess_descriptor
 
-    found = guess_descriptor(path_or_name, name, xacro=xacro, srdf=srdf, **overrides)
+    found = guess_descriptor(path_or_name, name, xacro=xacro, srdf=srdf, folder=folder, **overrides)
     if not quiet:
         print(found, file=sys.stderr)
     return found.descriptor
@@ -101,9 +102,10 @@ def _from_mjcf(
     name: str | None = None,
     *,
     quiet: bool = False,
+    folder: str | os.PathLike[str] | None = None,
     **overrides: Any,
 ) -> RobotDescriptor:
-    return _from_urdf(path_or_name, name, quiet=quiet, form="mjcf", **overrides)
+    return _from_urdf(path_or_name, name, quiet=quiet, form="mjcf", folder=folder, **overrides)
 
 
 def _with_gripper(

@@ -68,6 +68,7 @@ class FromUrdf(Protocol):
         quiet: bool = False,
         xacro: Mapping[str, object] | None = None,
         srdf: str | os.PathLike[str] | None = None,
+        folder: str | os.PathLike[str] | None = None,
         **overrides: Any,
     ) -> RobotDescriptor:
         """Guess a robot from its URDF, and say on stderr what was guessed and why.
@@ -81,6 +82,7 @@ class FromUrdf(Protocol):
             quiet: Whether to say nothing.
             xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
             srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
+            folder: A folder whose files may be read, too.
             **overrides: Fields that are known better than guessed.
         """
         ...
@@ -95,6 +97,7 @@ class FromMjcf(Protocol):
         name: str | None = None,
         *,
         quiet: bool = False,
+        folder: str | os.PathLike[str] | None = None,
         **overrides: Any,
     ) -> RobotDescriptor:
         """Guess a robot from its MJCF, and say on stderr what was guessed and why.
@@ -106,6 +109,7 @@ class FromMjcf(Protocol):
             path_or_name: An MJCF on this machine, or a name of the package robot_descriptions.
             name: Registry name; None takes that of the model.
             quiet: Whether to say nothing.
+            folder: A folder whose files may be read, too.
             **overrides: Fields that are known better than guessed.
         """
         ...

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
-from robot_layouts.core.cli import Word, main_of
+from robot_layouts.core.cli import Folder, Word, main_of
 from robot_layouts.core.commands import start
 from robot_layouts.core.errors import (
     AssetError,
@@ -41,6 +41,7 @@ def guess_descriptor(
     form: str | None = None,
     xacro: Mapping[str, object] | None = None,
     srdf: str | os.PathLike[str] | None = None,
+    folder: str | os.PathLike[str] | None = None,
     **overrides: Any,
 ) -> Guess:
     """Guess a robot's descriptor from its URDF or its MJCF; nothing is fetched for a path.
@@ -55,6 +56,8 @@ def guess_descriptor(
         srdf: An SRDF, whose groups are the arms and grippers, whose chains end in TCPs, and whose
             states and disabled pairs are taken over. None takes disabled pairs of one beside the
             URDF that is called as it, and nothing else.
+        folder: A folder whose files may be read, too, such as that of a package which lies
+            neither around nor beside the file.
         **overrides: Fields of `robots.RobotDescriptor` that are known better than guessed.
 
     Returns:
@@ -69,15 +72,17 @@ def guess_descriptor(
             group, link or joint that there is not.
     """
     path = _find(path_or_name, form)
+    opened = None if folder is None else str(absolute(folder, "folder"))
     if form == MJCF or (form is None and is_mjcf(path)):
         if xacro or srdf:
             what = "arguments of xacro" if xacro else "SRDF"
             raise DescriptorError(f"{path} is an MJCF, which takes no {what}")
         from robots.mjcf.conversion import convert
 
-        hints = convert(path).hints
-        return guess(LocalMjcf(str(path)), name, overrides, file=path, hints=hints)
-    source = LocalUrdf(str(with_arguments(path, xacro or {})))
+        mjcf = LocalMjcf(str(path), opened)
+        mjcf.locate()
+        return guess(mjcf, name, overrides, file=path, hints=convert(path).hints)
+    source = LocalUrdf(str(with_arguments(path, xacro or {})), opened)
     return guess(source, name, overrides, hints=_semantics(source, srdf) if srdf else NOTHING)
 
 
@@ -102,6 +107,7 @@ def print_guess(
     module: bool = False,
     xacro: Annotated[Sequence[tuple[str, str]], Word("KEY=VALUE", _argument, action="append")] = (),
     srdf: Annotated[str, Word("FILE")] | None = None,
+    folder: Folder | None = None,
 ) -> None:
     """Guess a robot's descriptor from its URDF or MJCF, and say why.
 
@@ -112,11 +118,12 @@ def print_guess(
         module: Print the data module to paste.
         xacro: Argument of a xacro template; may be given again.
         srdf: SRDF with the robot's groups, states and disabled pairs.
+        folder: Folder whose files may be read, too, such as that of a package elsewhere.
 
     Raises:
         RobotLayoutsError: If the file is unusable, or there is no robot of that name.
     """
-    found = guess_descriptor(urdf, name, xacro=dict(xacro), srdf=srdf)
+    found = guess_descriptor(urdf, name, xacro=dict(xacro), srdf=srdf, folder=folder)
     print(found.module().rstrip("\n") if module else found)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
 from robots.action_split import ActionSplit, JointGroup
-from robots.assets.assembled import AssembledUrdf, Part, carried_by
+from robots.assets.assembled import AssembledUrdf, UrdfPart, carried_by
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.bodies.overlaps import guess_allowed
 from robots.control_modes import CONTROL_MODES
@@ -37,7 +37,7 @@ from robots.descriptor import (
 )
 from robots.mjcf.locator import local_source
 from robots.named import named_robot
-from robots.urdf.model import UrdfModel
+from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tcp import find_tcp
@@ -75,19 +75,23 @@ def with_gripper(
 ) -> RobotDescriptor:
     """Return an arm with another gripper in the place of its own, if it has one.
 
+    A gripper is cut off at the last fixed joint before it. Fingers that hang on the last link of
+    the arm itself are cut off alone, and the housing in that link stays.
+
     Args:
         robot: The arm.
         gripper: The gripper, or an arm whose gripper is taken.
-        link: Link that carries it. None takes the one that carries the present gripper, or
-            without one the link of the tool centre point.
+        link: Link that carries it. None takes the one that carries the present gripper or fingers,
+            or without one the link of the tool centre point.
         position: Of the gripper's root in that link's frame (m); None takes that of the present
-            gripper, or without one that of the new one on the arm it is taken from.
+            gripper, or in place of fingers or nothing that of the new one on the arm it is taken
+            from.
         quaternion: How its root is turned there, wxyz; likewise.
         name: Registry name; None joins both names.
 
     Raises:
-        DescriptorError: If the present gripper is no part of its own that could be taken off, or
-            the robot has limbs.
+        DescriptorError: If the present fingers carry parts of the arm, the new ones hang on the arm
+            that should lend them, or a robot has limbs.
         UnknownNameError: If there is no such link or robot.
         AssetError: If files cannot be found or make no sense.
     """
@@ -99,11 +103,14 @@ def with_gripper(
     present = _gripper_joints(robot)
     mount, without = robot.tcp_link, ()
     if present:
-        cut, mount, origin = _flange(robot, _model(robot.urdf), present)
-        without = (cut,)
+        model = _model(robot.urdf)
+        if (flange := _flange(model, present)) is not None:
+            without, mount, origin = (flange.child,), flange.parent, flange.origin
+        else:
+            without, mount = _fingers(robot, model, present)
     if link is not None:
         mount, origin = link, np.eye(4)
-    part = Part(
+    part = UrdfPart(
         tool.urdf,
         mount,
         _vector(origin) if position is None else position,
@@ -147,7 +154,7 @@ def with_tool(
         )
     if tcp_link not in model.links:
         raise UnknownNameError("link of the tool", tcp_link, model.links)
-    part = Part(source, link or robot.tcp_link, position, quaternion)
+    part = UrdfPart(source, link or robot.tcp_link, position, quaternion)
     part = _apart(part, robot)
     urdf = AssembledUrdf(robot.urdf, (part,))
     tcp: dict[str, Any] = {
@@ -212,7 +219,7 @@ def on_body(
     for key, robot in robots.items():
         _refuse_limbs(robot, f"stand on a body as {key!r}")
     parts = [
-        Part(robots[key].urdf, m.link or model.root, m.position, m.quaternion, prefix=f"{key}_")
+        UrdfPart(robots[key].urdf, m.link or model.root, m.position, m.quaternion, prefix=f"{key}_")
         for key, m in mounts.items()
     ]
     urdf = AssembledUrdf(source, tuple(parts))
@@ -249,7 +256,7 @@ def _refuse_limbs(robot: RobotDescriptor, what: str) -> None:
 
 
 def _limbs(
-    robots: Mapping[str, RobotDescriptor], body: UrdfModel, parts: Sequence[Part]
+    robots: Mapping[str, RobotDescriptor], body: UrdfModel, parts: Sequence[UrdfPart]
 ) -> dict[str, Limb]:
     """Return robots, as they are named on a body, as the limbs of one robot."""
     tree = kinematic_tree(body)
@@ -318,7 +325,12 @@ def _gripper_of(robot: RobotDescriptor) -> tuple[RobotDescriptor, Floats, str]:
     if not joints or not robot.arm_joints or joints >= set(robot.joints):
         return robot, np.eye(4), ""
     model = _model(robot.urdf)
-    root, _, origin = _flange(robot, model, joints)
+    if (flange := _flange(model, joints)) is None:
+        raise DescriptorError(
+            f"{robot.name} cannot lend its gripper: no fixed joint carries all of it, its fingers"
+            " hang on the arm; take that of another robot"
+        )
+    root, origin = flange.child, flange.origin
     groups = {k: k for k, g in robot.action_split.groups.items() if set(g.joints) <= joints}
     own = {below.child for near in model.moving_on(root) for below in model.below(near)}
     links = {link for carried in (root, *own) for link in model.rigid_with(carried)}
@@ -331,29 +343,44 @@ def _gripper_of(robot: RobotDescriptor) -> tuple[RobotDescriptor, Floats, str]:
     return alone, origin, root
 
 
-def _flange(
-    robot: RobotDescriptor, model: UrdfModel, gripper: frozenset[str]
-) -> tuple[str, str, Floats]:
-    """Return the link to cut off, the one that carries it, and where it does, (4, 4).
-
-    The gripper is cut off at the last fixed joint before it.
-    """
+def _flange(model: UrdfModel, gripper: frozenset[str]) -> ModelJoint | None:
+    """Return the last fixed joint before a gripper that carries all of it; None if none does."""
     first = next(joint for joint in model.ordered if joint.name in gripper)
-    path = model.path_to(first.parent)
-    for joint in reversed(path):
+    for joint in reversed(model.path_to(first.parent)):
         if joint.moves:
             break
         carried = (below for near in model.moving_on(joint.child) for below in model.below(near))
         if gripper <= {below.name for below in carried}:
-            return joint.child, joint.parent, joint.origin
-    raise DescriptorError(
-        f"the gripper of {robot.name} cannot be taken off: no fixed joint between the arm and"
-        f" {first.parent!r} carries all of it"
-    )
+            return joint
+    return None
+
+
+def _fingers(
+    robot: RobotDescriptor, model: UrdfModel, gripper: frozenset[str]
+) -> tuple[tuple[str, ...], str]:
+    """Return the links of fingers that hang on an arm, to cut off, and a link that carries them.
+
+    Raises:
+        DescriptorError: If they carry parts of the arm.
+    """
+    joints = [joint for joint in model.ordered if joint.name in gripper]
+    first = [j for j in joints if gripper.isdisjoint(p.name for p in model.path_to(j.parent))]
+    carried = {below.name for joint in first for below in model.below(joint)}
+    if not carried <= gripper:
+        others = ", ".join(sorted(carried - gripper))
+        raise DescriptorError(
+            f"the gripper of {robot.name} cannot be cut off: it carries {others}, which are no"
+            " joints of a gripper"
+        )
+    return tuple(joint.child for joint in first), first[0].parent
 
 
 def _with_part(
-    robot: RobotDescriptor, tool: RobotDescriptor, part: Part, without: tuple[str, ...], name: str
+    robot: RobotDescriptor,
+    tool: RobotDescriptor,
+    part: UrdfPart,
+    without: tuple[str, ...],
+    name: str,
 ) -> RobotDescriptor:
     part = _apart(part, robot, without)
     urdf = AssembledUrdf(robot.urdf, (part,), without)
@@ -387,7 +414,7 @@ def _with_part(
     return replace(made, reach=_reach(robot, made))
 
 
-def _apart(part: Part, robot: RobotDescriptor, without: Sequence[str] = ()) -> Part:
+def _apart(part: UrdfPart, robot: RobotDescriptor, without: Sequence[str] = ()) -> UrdfPart:
     """Return a part with a prefix, if it has a name that is left of the robot."""
     body, tool = _model(robot.urdf), _model(part.urdf)
     kept = _names(body, {*body.links} - carried_by(body, without))

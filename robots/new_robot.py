@@ -43,18 +43,21 @@ def test_every_action_number_moves_its_own_joints():
 '''
 
 
-def new_robot(urdf: str, *, name: str | None = None, out: Folder = Path()) -> None:
+def new_robot(
+    urdf: str, *, name: str | None = None, out: Folder = Path(), folder: Folder | None = None
+) -> None:
     """Write the file of a new robot from its URDF, and a test.
 
     Args:
         urdf: URDF or MJCF, or name in robot_descriptions.
         name: Name of the robot (the name in its URDF).
         out: Folder of the files.
+        folder: Folder whose files may be read, too, such as that of a package elsewhere.
 
     Raises:
         RobotLayoutsError: If the URDF is unusable, or a file is there already.
     """
-    found = guess_descriptor(urdf, name)
+    found = guess_descriptor(urdf, name, folder=folder)
     name = found.descriptor.name
     module, constant = name.lower(), name.upper()
     better = f"--name my_{module}"
@@ -76,8 +79,10 @@ def new_robot(urdf: str, *, name: str | None = None, out: Folder = Path()) -> No
 
 
 def _seen_from(folder: Path, source: Any) -> LocalUrdf | LocalMjcf:
-    """Return where a user's file is, with its path relative to a folder."""
-    return replace(source, path=Path(os.path.relpath(source.path, folder.absolute())))
+    """Return where a user's file is, with its paths relative to a folder."""
+    given = {"path": source.path, "folder": source.folder}
+    start = folder.absolute()
+    return replace(source, **{k: Path(os.path.relpath(p, start)) for k, p in given.items() if p})
 
 
 main = main_of(new_robot, "new robot")

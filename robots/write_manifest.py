@@ -21,8 +21,8 @@ from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import (
     LARGEST_FILE,
     AssetFile,
+    AssetManifest,
     AssetPackage,
-    Manifest,
     PackageOrigin,
     load_manifest,
 )
@@ -71,7 +71,7 @@ def write_manifest(*, check: bool = False) -> int:
     return 0
 
 
-def build_manifest() -> Manifest:
+def build_manifest() -> AssetManifest:
     """Return the manifest of everything that the catalogue's URDFs need, and of the scenery.
 
     What is of an index package that is not installed is taken from the manifest that there is.
@@ -88,7 +88,7 @@ def build_manifest() -> Manifest:
             urdfs.setdefault(locator.package, set()).add(locator.file)
     packages = {name: _build_or_keep(name, urdfs[name]) for name in urdfs}
     scenes = build_scenery(find_package(MANI_SKILL.name))
-    return Manifest({**packages, scenery.PACKAGE: scenes})
+    return AssetManifest({**packages, scenery.PACKAGE: scenes})
 
 
 def _build_or_keep(name: str, urdfs: set[str]) -> AssetPackage:

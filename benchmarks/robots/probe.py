@@ -206,7 +206,7 @@ def kinematic_difference(path: Path, postures: int = POSTURES["kinematics"]) -> 
     Raises:
         RobotLayoutsError: If it cannot be converted.
     """
-    model: Any = compiled(read_mjcf(path), path)
+    model, _ = compiled(read_mjcf(path), path)
     robot, urdf, frames = find_robot(model, path), locate(path), convert(path).frames
     fixed = find_couplings(robot, path).fixed
     tree = kinematic_tree(read_model(read_urdf(urdf), urdf.as_posix()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -20,13 +20,12 @@ from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_urdf
-from robots.urdf.text import rename
 
 URDF = "assembled.urdf"
 
 
 @dataclass(frozen=True)
-class Part:
+class UrdfPart:
     """A URDF, and where its root link is fixed.
 
     Attributes:
@@ -66,7 +65,7 @@ class AssembledUrdf:
     """
 
     body: UrdfSource
-    parts: tuple[Part, ...] = ()
+    parts: tuple[UrdfPart, ...] = ()
     without: tuple[str, ...] = ()
 
     def locate(self, *, pictures: bool = False) -> Path:
@@ -116,12 +115,12 @@ class _Assembly:
                 continue
             for visual in [] if self._pictures else element.findall("visual"):
                 element.remove(visual)
-            rename(element, lambda name: prefix + name, lambda name: self._file(name, path))
+            _rename(element, lambda name: prefix + name, lambda name: self._file(name, path))
             self._expect_new(element, path)
             self._robot.append(element)
         return prefix + root
 
-    def fix(self, part: Part) -> None:
+    def fix(self, part: UrdfPart) -> None:
         """Take a part over and fix its root to a link."""
         if part.link not in self._names["link"]:
             raise UnknownNameError("link to fix something to", part.link, self._names["link"])
@@ -141,7 +140,7 @@ class _Assembly:
         digest = hashlib.sha256(repr((xml, links)).encode()).hexdigest()[:16]
         folder = default_root() / "assembled" / digest
         if not (folder / URDF).is_file():
-            _make(folder, xml, dict(links))
+            write_folder(folder, {URDF: xml}, dict(links))
         return folder / URDF
 
     def _file(self, reference: str, urdf: Path) -> str:
@@ -186,20 +185,41 @@ def _belongs(element: Element, links: frozenset[str], root: str) -> bool:
     return element.tag == "material" or (element.tag == "link" and element.get("name") in links)
 
 
-def _make(folder: Path, xml: bytes, links: Mapping[str, str]) -> None:
-    """Make the folder of a URDF, unless another process is faster.
+def _rename(element: Element, name: Callable[[str], str], file: Callable[[str], str]) -> None:
+    """Give a link, joint or material, and what it refers to, other names."""
+    names = [(element, "name"), *((part, "name") for part in element.iter("material"))]
+    names += [(part, "link") for part in element if part.tag in ("parent", "child")]
+    names += [(part, "joint") for part in element.iterfind("mimic")]
+    for part, key in {id(part): (part, key) for part, key in names}.values():
+        if old := part.get(key):
+            part.set(key, name(old))
+    for part in (*element.iter("mesh"), *element.iter("texture")):
+        part.set("filename", file(part.get("filename", "")))
+
+
+def write_folder(
+    folder: Path, files: Mapping[str, bytes], links: Mapping[str, str] | None = None
+) -> None:
+    """Make a folder of files in the local copy, unless another process is faster.
+
+    Args:
+        folder: The folder.
+        files: Contents by name.
+        links: Folders that links in it lead to, by the path of the link.
 
     Raises:
         UnwritableFileError: If it cannot be written.
     """
     try:
         with written_whole(folder) as unfinished:
-            (unfinished / "meshes").mkdir(parents=True)
-            for name, target in links.items():
+            unfinished.mkdir(parents=True)
+            for name, target in (links or {}).items():
+                (unfinished / name).parent.mkdir(exist_ok=True)
                 (unfinished / name).symlink_to(target, target_is_directory=True)
-            (unfinished / URDF).write_bytes(xml)
+            for name, contents in files.items():
+                (unfinished / name).write_bytes(contents)
     except UnwritableFileError:
-        if not (folder / URDF).is_file():
+        if not all((folder / name).is_file() for name in files):
             raise
 
 

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from robot_layouts.core.errors import AssetError
+from robot_layouts.core.paths import absolute
 
 
 @dataclass(frozen=True)
@@ -67,9 +67,11 @@ class LocalUrdf:
     Attributes:
         path: Path of the URDF; ``~`` is the home directory. A xacro template will do, with its
             arguments behind it: ``arm.urdf.xacro?prefix=left_``.
+        folder: A folder whose files may be read, too: that of a package which lies elsewhere.
     """
 
     path: str | os.PathLike[str]
+    folder: str | os.PathLike[str] | None = None
 
     def locate(self, *, pictures: bool = False) -> Path:
         """Return the absolute path of the URDF after a look at the meshes it refers to.
@@ -83,14 +85,24 @@ class LocalUrdf:
                 `robots.urdf.paths`).
         """
         from robots.urdf.reading import read_model
-        from robots.urdf.summary import read_references, read_urdf
+        from robots.urdf.summary import expect_files, read_urdf
 
-        path = Path(self.path).expanduser().absolute()
+        path = opened_path(self.path, self.folder)
         xml = read_urdf(path)
         read_model(xml, path.as_posix())
-        references = read_references(xml, path.as_posix(), exists=os.path.isfile)
-        wanted = references.collision + (references.visual if pictures else ())
-        missing = [mesh for mesh in wanted if not os.path.isfile(mesh)]
-        if missing:
-            raise AssetError(f"{path} refers to files that do not exist: {', '.join(missing)}")
+        expect_files(xml, path.as_posix(), pictures=pictures)
         return path
+
+
+def opened_path(path: str | os.PathLike[str], folder: str | os.PathLike[str] | None) -> Path:
+    """Return the absolute path of a user's file, for which a folder is opened if one is given.
+
+    Raises:
+        AssetError: If the folder is none.
+    """
+    from robots.urdf.paths import open_folder
+
+    file = Path(path).expanduser().absolute()
+    if folder is not None:
+        open_folder(file.as_posix(), absolute(folder, "folder").as_posix())
+    return file

@@ -17,6 +17,7 @@ from robot_layouts.core.paths import CHECKOUT_CACHE
 
 LARGEST_FILE = 2**28  # bytes
 LARGEST_TRUSTED_FILE = 2**26  # bytes; of one whose size the manifest does not promise
+_KEPT = ("bytes", "sha256", "physics", "pictures")  # of a file, as the manifest has them
 _LARGEST_MANIFEST = 2**24  # bytes
 
 
@@ -137,7 +138,7 @@ class AssetPackage:
 
 
 @dataclass(frozen=True)
-class Manifest:
+class AssetManifest:
     """Every package of robot files, by name."""
 
     packages: Mapping[str, AssetPackage]
@@ -158,7 +159,7 @@ class Manifest:
         return json.dumps({"packages": packages}, indent=1) + "\n"
 
     @classmethod
-    def from_json(cls, text: str) -> Manifest:
+    def from_json(cls, text: str) -> AssetManifest:
         """Read what `to_json` wrote; it is ours, and a test checks what it holds.
 
         Raises:
@@ -169,7 +170,7 @@ class Manifest:
 
 
 @lru_cache(maxsize=1)
-def load_manifest() -> Manifest:
+def load_manifest() -> AssetManifest:
     """Return the manifest of this checkout, or of this installation.
 
     Raises:
@@ -184,7 +185,7 @@ def load_manifest() -> Manifest:
             " robot-layouts again"
         )
     try:
-        return Manifest.from_json(read_text(path, _LARGEST_MANIFEST))
+        return AssetManifest.from_json(read_text(path, _LARGEST_MANIFEST))
     except UnreadableFileError as error:
         raise AssetError(f"{error}; install robot-layouts again") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -196,12 +197,7 @@ def load_manifest() -> Manifest:
 def _package_to_json(package: AssetPackage) -> dict[str, Any]:
     origin = {key: value for key, value in vars(package.origin).items() if key != "name" and value}
     files = {
-        file.path: {
-            "bytes": file.bytes,
-            "sha256": file.sha256,
-            "physics": list(file.physics),
-            "pictures": list(file.pictures),
-        }
+        file.path: {key: getattr(file, key) for key in _KEPT}
         for file in sorted(package.files, key=lambda file: file.path)
     }
     undrawable = {"undrawable": list(package.undrawable)} if package.undrawable else {}
@@ -211,15 +207,9 @@ def _package_to_json(package: AssetPackage) -> dict[str, Any]:
 def _package_from_json(name: str, about: dict[str, Any]) -> AssetPackage:
     files, undrawable = about.pop("files"), tuple(about.pop("undrawable", ()))
     origin = PackageOrigin(name, **about)
-    listed = [
-        AssetFile(
-            origin,
-            path,
-            file["bytes"],
-            file["sha256"],
-            tuple(file["physics"]),
-            tuple(file["pictures"]),
-        )
+    listed = (
+        AssetFile(origin, path, size, sha256, tuple(physics), tuple(pictures))
         for path, file in sorted(files.items())
-    ]
+        for size, sha256, physics, pictures in [[file[key] for key in _KEPT]]
+    )
     return AssetPackage(origin, tuple(listed), undrawable)

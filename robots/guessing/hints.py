@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from robots.guessing import words
 from robots.guessing.anatomy import FEWEST_ARM_JOINTS, Anatomy, Limb
 from robots.urdf.model import ModelJoint, UrdfModel
-from robots.urdf.srdf import EndEffector, Group, Semantics
+from robots.urdf.srdf import EndEffector, Semantics, SrdfGroup
 
 LEFT_OUT = ("arm", "manipulator", "group")  # words that say nothing of which arm a group is
 
@@ -162,7 +162,7 @@ def _arm_of(effector: EndEffector, semantics: Semantics) -> str:
     return min(arms, key=lambda group: len(group.joints)).name if arms else ""
 
 
-def _contains_another(group: Group, semantics: Semantics, hands: Iterable[str]) -> bool:
+def _contains_another(group: SrdfGroup, semantics: Semantics, hands: Iterable[str]) -> bool:
     """Tell whether another arm is part of a group, which then is an arm with a torso, say."""
     own = set(group.joints)
     return any(

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import hashlib
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from robot_layouts.core.errors import UnwritableFileError
 from robot_layouts.core.paths import default_root
-from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.rotations import Floats
+from robots.assets.assembled import write_folder
 from robots.guessing.hints import Hints
 from robots.mjcf.couplings import Couplings, find_couplings
 from robots.mjcf.reading import MjcfText, Model, compiled, name_of, read_mjcf
-from robots.mjcf.robot import MjcfRobot, dry_friction, find_drives, find_efforts, find_robot
+from robots.mjcf.robot import (
+    HINGE,
+    MjcfRobot,
+    dry_friction,
+    find_drives,
+    find_efforts,
+    find_robot,
+)
 from robots.mjcf.to_urdf import excluded, write_urdf
 
 FORM = 1  # of what is made of an MJCF; counted up whenever that changes
@@ -75,18 +83,19 @@ def locate(path: Path) -> Path:
     folder = default_root() / "mjcf" / hashlib.sha256(key.encode()).hexdigest()[:16]
     urdf = folder / f"{path.stem}.urdf"
     if not urdf.is_file():
-        _write(folder, urdf.name, _convert(path, text))
+        made = _convert(path, text)
+        write_folder(folder, {**made.meshes, urdf.name: made.xml})
     return urdf
 
 
 @lru_cache(maxsize=KEPT)
 def _convert(path: Path, text: MjcfText) -> Converted:
-    model = compiled(text, path)
+    model, mended = compiled(text, path)
     robot = find_robot(model, path)
     couplings = find_couplings(robot, path)
     urdf = write_urdf(robot, couplings, find_efforts(robot), text.name)
     rubbing = dry_friction(robot)
-    notes = [*robot.notes, *couplings.notes, *urdf.notes]
+    notes = [*_doubtful(robot), *mended, *robot.notes, *couplings.notes, *urdf.notes]
     if rubbing:
         notes.append(
             f"dry friction of {', '.join(rubbing)} is left out: PhysX has none in N·m or N"
@@ -103,6 +112,18 @@ def _convert(path: Path, text: MjcfText) -> Converted:
     return Converted(text.name, urdf.xml, urdf.meshes, hints, urdf.frames)
 
 
+def _doubtful(robot: MjcfRobot) -> Iterator[str]:
+    """Yield that ranges are those of radians, which were read as degrees, if they look like it."""
+    model = robot.model
+    hinges = [j for j in robot.moving if model.jnt_type[j] == HINGE and model.jnt_limited[j]]
+    widest = max((float(np.ptp(model.jnt_range[joint])) for joint in hinges), default=math.inf)
+    if widest < math.radians(2 * math.pi):
+        yield (
+            f"no hinge turns by more than {math.degrees(widest):.2g}°, so the ranges seem to be in"
+            ' radians, and are read as degrees: write <compiler angle="radian"/> into the MJCF'
+        )
+
+
 def _postures(model: Model, robot: MjcfRobot, couplings: Couplings) -> dict[str, dict[str, float]]:
     """Return where the joints are in each keyframe (rad, m)."""
     postures: dict[str, dict[str, float]] = {}
@@ -114,16 +135,3 @@ def _postures(model: Model, robot: MjcfRobot, couplings: Couplings) -> dict[str,
             if joint not in couplings.fixed
         }
     return {name: at for name, at in postures.items() if np.isfinite(list(at.values())).all()}
-
-
-def _write(folder: Path, name: str, converted: Converted) -> None:
-    """Make the folder of a URDF, unless another process is faster."""
-    try:
-        with written_whole(folder) as unfinished:
-            unfinished.mkdir(parents=True)
-            for mesh, contents in converted.meshes.items():
-                (unfinished / mesh).write_bytes(contents)
-            (unfinished / name).write_bytes(converted.xml)
-    except UnwritableFileError:
-        if not (folder / name).is_file():
-            raise

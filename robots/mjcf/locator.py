@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from robots.assets.locator import LocalUrdf
+from robots.assets.locator import LocalUrdf, opened_path
 
 ENDINGS = (".xml", ".mjcf")
 
@@ -27,9 +27,11 @@ class LocalMjcf:
 
     Attributes:
         path: Path of the MJCF; ``~`` is the home directory.
+        folder: A folder whose files may be read, too.
     """
 
     path: str | os.PathLike[str]
+    folder: str | os.PathLike[str] | None = None
 
     def locate(self, *, pictures: bool = False) -> Path:
         """Return the path of a URDF made of the MJCF, in the local copy of robot files.
@@ -49,4 +51,4 @@ class LocalMjcf:
         """
         from robots.mjcf.conversion import locate
 
-        return locate(Path(self.path).expanduser().absolute())
+        return locate(opened_path(self.path, self.folder))

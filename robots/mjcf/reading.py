@@ -9,6 +9,8 @@ from __future__ import annotations
 import hashlib
 import os
 import posixpath
+import re
+import warnings
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -22,7 +24,7 @@ from robot_layouts.core.errors import AssetError, MissingPackageError, Unreadabl
 from robot_layouts.core.files import read_regular
 from robot_layouts.core.quoting import shown
 from robots.urdf.mesh_files import MAX_MESH_BYTES
-from robots.urdf.paths import is_allowed
+from robots.urdf.paths import is_allowed, leads_out
 from robots.urdf.summary import MAX_URDF_BYTES
 from robots.urdf.text import parse_xml
 
@@ -33,6 +35,7 @@ MOST_BYTES = 1 << 30  # of them together
 # Parts of an MJCF that say nothing of links, joints and drives; some of them name files.
 UNUSED = ("size", "visual", "statistic", "option", "custom", "sensor", "extension")
 UNUSED_ASSETS = ("texture", "skin", "hfield")
+REFUSED_ELEMENT = re.compile("Element name '(.*)', id")  # as MuJoCo's messages end
 MESSAGE = 400  # characters of MuJoCo's own that an error keeps
 NUMBERS = {  # MuJoCo takes "nan" for a number
     "a body": ("body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat"),
@@ -197,19 +200,10 @@ class _Reading:
         tried = dict.fromkeys(
             posixpath.normpath(posixpath.join(folder, reference)) for folder in folders
         )
-        allowed = [path for path in tried if self._may(path)]
+        allowed = [path for path in tried if is_allowed(path, self._folder, os.path.exists)]
         if not allowed:
-            raise AssetError(
-                f"{self._path} refers to {shown(reference)}, which leads out of its folder and its"
-                " package (the folder around it with a package.xml, .git or __init__.py); files"
-                " elsewhere are not opened: copy it beside the MJCF"
-            )
+            raise leads_out(str(self._path), reference)
         return Path(next((path for path in allowed if os.path.isfile(path)), allowed[0]))
-
-    def _may(self, path: str) -> bool:
-        package = _python_package(self._folder)
-        inside = bool(package) and path.startswith(f"{package}/")
-        return inside or is_allowed(path, self._folder, os.path.exists)
 
 
 def _mesh_folder(root: Element) -> str:
@@ -226,15 +220,6 @@ def _mesh_folder(root: Element) -> str:
             if file := mesh.get("file"):
                 mesh.set("file", posixpath.basename(file.replace("\\", "/")))
     return found["meshdir"] or found["assetdir"]
-
-
-def _python_package(folder: str) -> str:
-    """Return the nearest folder around a folder, or itself, that is a Python package."""
-    while posixpath.dirname(folder) not in ("", "/", folder):
-        if os.path.isfile(f"{folder}/__init__.py"):
-            return folder
-        folder = posixpath.dirname(folder)
-    return ""
 
 
 def _drop(parent: Element, tags: tuple[str, ...]) -> None:
@@ -263,13 +248,15 @@ def without_log() -> Generator[None]:
     library = mujoco()
     library.set_mju_user_warning(lambda warning: None)  # what is wrong is an error
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     finally:
         library.set_mju_user_warning(None)
 
 
-def compiled(text: MjcfText, path: Path) -> Model:
-    """Return the model that MuJoCo makes of an MJCF.
+def compiled(text: MjcfText, path: Path) -> tuple[Model, tuple[str, ...]]:
+    """Return the model that MuJoCo makes of an MJCF, and what was mended in it.
 
     Args:
         text: The MJCF.
@@ -279,17 +266,46 @@ def compiled(text: MjcfText, path: Path) -> Model:
         AssetError: If MuJoCo refuses it, or a number of it is not finite.
         MissingPackageError: If MuJoCo is not installed.
     """
+    notes: dict[str, str] = {}  # by mesh
     library = mujoco()
     try:
         with without_log():
-            model = library.MjModel.from_xml_string(text.xml, dict(text.meshes))
+            spec = library.MjSpec.from_string(text.xml, assets=dict(text.meshes))
+            model = _compile(spec, library, notes)
     except Exception as error:  # a compiler that raises whatever it meets
         reason = " ".join(str(error).split())[:MESSAGE]
         raise AssetError(f"MuJoCo cannot compile {path}: {reason}") from error
     for what, fields in NUMBERS.items():
         if not all(np.isfinite(getattr(model, field)).all() for field in fields):
             raise AssetError(f"{path} has {what} with a number that is not finite")
-    return model
+    return model, tuple(notes.values())
+
+
+def _compile(spec: Any, library: Any, notes: dict[str, str]) -> Model:
+    """Compile a spec; a mesh that is too thin for MuJoCo is made a shell, or is left out.
+
+    Args:
+        spec: What to compile; it is changed.
+        library: The package mujoco.
+        notes: Takes what was done, by mesh.
+    """
+    shell = library.mjtMeshInertia.mjMESH_INERTIA_SHELL
+    while True:
+        try:
+            return spec.compile()
+        except ValueError as error:
+            named = REFUSED_ELEMENT.search(str(error))
+            mesh = spec.mesh(named[1]) if named else None
+            geoms = [geom for geom in spec.geoms if mesh and geom.meshname == mesh.name]
+            if mesh and mesh.inertia != shell:
+                mesh.inertia = shell
+                notes[mesh.name] = f"the mesh {mesh.name!r} has no volume, so it is a shell"
+            elif mesh and not any(geom.contype or geom.conaffinity for geom in geoms):
+                notes[mesh.name] = f"left out: the mesh {mesh.name!r}, which is only drawn"
+                for element in (*geoms, mesh):
+                    spec.delete(element)
+            else:
+                raise
 
 
 def name_of(model: Model, kind: str, index: int) -> str:

@@ -66,7 +66,8 @@ def find_robot(model: Model, path: Path) -> MjcfRobot:
         raise DescriptorError(
             f"{path} has no joint that turns or slides; there is nothing to drive"
         )
-    actuated = {int(root_of[joint]) for joint in _driven(model)}
+    driven = [joint for i in range(model.nu) for joint, _ in _targets(model, i)]
+    actuated = {int(root_of[joint]) for joint in driven}
     chosen = sorted(jointed & actuated or jointed)
     notes = [*_left_out(model, roots, jointed, chosen)]
     bodies = tuple(np.flatnonzero(np.isin(model.body_rootid, chosen)).tolist())
@@ -83,16 +84,12 @@ def find_robot(model: Model, path: Path) -> MjcfRobot:
     return MjcfRobot(model, tuple(chosen), bodies, joints, links, named, tuple(notes))
 
 
-def _driven(model: Model) -> set[int]:
-    """Return the joints that an actuator drives, also by a tendon."""
-    found: set[int] = set()
-    for actuator in range(model.nu):
-        target = int(model.actuator_trnid[actuator, 0])
-        if model.actuator_trntype[actuator] in (JOINT, JOINT_IN_PARENT):
-            found.add(target)
-        elif model.actuator_trntype[actuator] == TENDON:
-            found |= {joint for joint, _ in tendon_joints(model, target)}
-    return found
+def _targets(model: Model, actuator: int) -> list[tuple[int, float]]:
+    """Return the joints that an actuator drives, also by a tendon, with their coefficients."""
+    target = int(model.actuator_trnid[actuator, 0])
+    if model.actuator_trntype[actuator] in (JOINT, JOINT_IN_PARENT):
+        return [(target, 1.0)]
+    return tendon_joints(model, target) if model.actuator_trntype[actuator] == TENDON else []
 
 
 def tendon_joints(model: Model, tendon: int) -> list[tuple[int, float]]:
@@ -220,29 +217,23 @@ def dry_friction(robot: MjcfRobot) -> list[str]:
 
 def _actuators(model: Model, joint: int) -> list[tuple[int, float]]:
     """Return the actuators of a joint, and the factor from their force to the joint's."""
-    found: list[tuple[int, float]] = []
-    for actuator in range(model.nu):
-        kind, target = int(model.actuator_trntype[actuator]), int(model.actuator_trnid[actuator, 0])
-        gear = abs(float(model.actuator_gear[actuator, 0]))
-        if kind in (JOINT, JOINT_IN_PARENT) and target == joint:
-            found.append((actuator, gear))
-        elif kind == TENDON:
-            factors = [abs(c) for j, c in tendon_joints(model, target) if j == joint]
-            found += [(actuator, gear * factor) for factor in factors if factor]
-    return found
+    return [
+        (actuator, abs(float(model.actuator_gear[actuator, 0])) * abs(coefficient))
+        for actuator in range(model.nu)
+        for target, coefficient in _targets(model, actuator)
+        if target == joint and coefficient
+    ]
 
 
 def _spring(model: Model, joint: int) -> tuple[float, float]:
     """Return stiffness and damping of the actuators on a joint itself; 0 if they are no spring."""
     stiffness = damping = 0.0
-    for actuator in range(model.nu):
-        kind = int(model.actuator_trntype[actuator])
-        if kind in (JOINT, JOINT_IN_PARENT) and int(model.actuator_trnid[actuator, 0]) == joint:
-            if int(model.actuator_biastype[actuator]) == AFFINE_GAIN:
-                _, position, velocity = model.actuator_biasprm[actuator, :3].tolist()
-                gear = float(model.actuator_gear[actuator, 0]) ** 2
-                stiffness += max(-position, 0.0) * gear
-                damping += max(-velocity, 0.0) * gear
+    for actuator, gear in _actuators(model, joint):
+        itself = model.actuator_trntype[actuator] != TENDON
+        if itself and model.actuator_biastype[actuator] == AFFINE_GAIN:
+            _, position, velocity = model.actuator_biasprm[actuator, :3].tolist()
+            stiffness += max(-position, 0.0) * gear**2
+            damping += max(-velocity, 0.0) * gear**2
     return stiffness, damping
 
 

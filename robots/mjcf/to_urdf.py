@@ -65,8 +65,7 @@ def write_urdf(
         efforts: The largest force of each joint's actuators, where it is known (N·m, N).
         name: What the robot is called.
     """
-    made = UrdfText()
-    writer = _Writer(robot, couplings, efforts, made)
+    writer = _Writer(robot, couplings, efforts)
     root = Element("robot", name=name)
     if writer.world:
         root.append(Element("link", name=writer.world))
@@ -74,21 +73,17 @@ def write_urdf(
         root.extend(writer.body(body))
     root.extend(writer.sites())
     indent(root)
-    made.xml = tostring(root, encoding="utf-8", xml_declaration=True)
-    return made
+    writer.made.xml = tostring(root, encoding="utf-8", xml_declaration=True)
+    return writer.made
 
 
 class _Writer:
     """Writes the links and joints of one robot."""
 
     def __init__(
-        self,
-        robot: MjcfRobot,
-        couplings: Couplings,
-        efforts: Mapping[int, float],
-        made: UrdfText,
+        self, robot: MjcfRobot, couplings: Couplings, efforts: Mapping[int, float]
     ) -> None:
-        self._robot, self._model, self._made = robot, robot.model, made
+        self._robot, self._model, self.made = robot, robot.model, UrdfText()
         self._couplings, self._efforts = couplings, efforts
         self._taken = {*robot.links.values()}
         self._joints = {*robot.names.values()}
@@ -104,9 +99,9 @@ class _Writer:
         link = Element("link", name=self._robot.links[body])
         elements, end = self._chain(body)
         self._inside[body] = inside = inverse_pose(end)
-        self._made.frames[self._robot.links[body]] = inside
+        self.made.frames[self._robot.links[body]] = inside
         inertial(link, self._model, body, inside)
-        self._made.notes += add_shapes(link, self._model, body, inside, self._made.meshes)
+        self.made.notes += add_shapes(link, self._model, body, inside, self.made.meshes)
         return [link, *elements]
 
     def _chain(self, body: int) -> tuple[list[Element], Floats]:
@@ -175,7 +170,7 @@ class _Writer:
             numbers |= {"lower": text(low), "upper": text(high)}
         elif slides:
             numbers |= {"lower": text(-FARTHEST), "upper": text(FARTHEST)}
-            self._made.notes.append(
+            self.made.notes.append(
                 f"joint {name!r} slides without a range; it was given {FARTHEST:g} m each way"
             )
         if joint in self._efforts:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import posixpath
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -246,15 +245,12 @@ def expect_inertia(link: Element, where: str, *, moves: bool) -> None:
 
 
 def _is_positive(moments: list[float], products: list[float]) -> bool:
-    """Tell whether a symmetric matrix is positive definite, by Cholesky's decomposition."""
+    """Tell whether a symmetric matrix is positive definite."""
+    import numpy as np
+
     (xx, yy, zz), (xy, xz, yz) = moments, products
-    scale = max(moments)
-    a = math.sqrt(xx / scale)
-    b, c = xy / scale / a, xz / scale / a
-    if (d := yy / scale - b * b) <= _ROUNDING:
-        return False
-    e = (yz / scale - b * c) / math.sqrt(d)
-    return zz / scale - c * c - e * e > _ROUNDING
+    tensor = np.array([(xx, xy, xz), (xy, yy, yz), (xz, yz, zz)])
+    return bool(np.linalg.eigvalsh(tensor / max(moments))[0] > _ROUNDING)
 
 
 def expect_drivable(joints: Sequence[ModelJoint], urdf: str) -> None:

@@ -61,9 +61,14 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
     """
     import trimesh  # which takes half a second to load
 
-    ending = _ending(path, where)
+    ending = posixpath.splitext(path)[1].lower()
+    if ending not in ENDINGS:
+        raise AssetError(
+            f"{where}: the mesh {path} ends in {ending or 'nothing'}; meshes end in"
+            f" {', '.join(ENDINGS)}"
+        )
     contents = _read(path, where)
-    beside: Any = _SideFiles(path, posixpath.dirname(urdf or path), where)
+    beside: Any = _SideFiles(path, urdf, where)
     beside.expect_allowed(ending, contents)
     try:
         if ending == ".dae":
@@ -188,16 +193,6 @@ def has_volume(corners: Floats) -> bool:
     return bool(np.ptp(spread @ directions[:, 0]) >= SMALLEST)
 
 
-def _ending(path: str, where: str) -> str:
-    ending = posixpath.splitext(path)[1].lower()
-    if ending not in ENDINGS:
-        raise AssetError(
-            f"{where}: the mesh {path} ends in {ending or 'nothing'}; meshes end in"
-            f" {', '.join(ENDINGS)}"
-        )
-    return ending
-
-
 def _read(path: str, where: str) -> bytes:
     try:
         return read_regular(path, MAX_MESH_BYTES)
@@ -208,9 +203,11 @@ def _read(path: str, where: str) -> bytes:
 class _SideFiles:
     """What a mesh's reader may open besides the mesh, as a resolver for trimesh."""
 
-    def __init__(self, path: str, folder: str, where: str) -> None:
+    def __init__(self, path: str, urdf: str | None, where: str) -> None:
         self.file_name = posixpath.basename(path)  # trimesh calls meshes so that have no name
-        self._path, self._folder, self._where = path, folder, where
+        self._path, self._where = path, where
+        # A mesh of another package than the URDF's has its materials there.
+        self._folders = {posixpath.dirname(file) for file in (urdf, path) if file}
 
     def expect_allowed(self, ending: str, contents: bytes) -> None:
         """Refuse a file that names others which may not be opened, whoever would open them.
@@ -236,10 +233,11 @@ class _SideFiles:
             path = posixpath.normpath(posixpath.join(posixpath.dirname(self._path), variant))
             if "\0" in path or not os.path.lexists(path):
                 continue
-            if not is_allowed(path, self._folder, os.path.isfile):
+            if not any(is_allowed(path, folder, os.path.isfile) for folder in self._folders):
                 raise AssetError(
                     f"{self._where}: the mesh {self._path} refers to {name!r}, which leads out of"
-                    " the folders that a robot's files may refer to; such files are not opened"
+                    " the folders that a robot's files may refer to; such files are not opened,"
+                    " unless in a folder that is named with folder=… (--folder DIR)"
                 )
             found = found or path
         if not found:

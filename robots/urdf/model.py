@@ -42,7 +42,7 @@ class UrdfShape:
 
 
 @dataclass(frozen=True, eq=False)
-class Inertial:
+class LinkInertia:
     """What a link weighs.
 
     Attributes:
@@ -126,7 +126,7 @@ class UrdfModel:
     joints: tuple[ModelJoint, ...]
     collisions: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
     visuals: Mapping[str, tuple[UrdfShape, ...]] = field(default_factory=dict)
-    inertials: Mapping[str, Inertial] = field(default_factory=dict)
+    inertials: Mapping[str, LinkInertia] = field(default_factory=dict)
 
     @cached_property
     def parent_joint(self) -> dict[str, ModelJoint]:
@@ -149,14 +149,6 @@ class UrdfModel:
         for joint in self.joints:
             carried[joint.parent].append(joint)
         return carried
-
-    @cached_property
-    def _fixed_on(self) -> dict[str, list[str]]:
-        fixed: dict[str, list[str]] = {}
-        for joint in self.joints:
-            if not joint.moves:
-                fixed.setdefault(joint.parent, []).append(joint.child)
-        return fixed
 
     @cached_property
     def ordered(self) -> tuple[ModelJoint, ...]:
@@ -184,7 +176,7 @@ class UrdfModel:
         """Return a link and all that hangs on it by fixed joints, nearest first."""
         found = [link]
         for near in found:
-            found += self._fixed_on.get(near, ())
+            found += [joint.child for joint in self._carried.get(near, ()) if not joint.moves]
         return tuple(found)
 
     def moving_on(self, link: str) -> tuple[ModelJoint, ...]:

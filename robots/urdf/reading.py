@@ -1,27 +1,26 @@
-"""Reads a URDF: yourdfpy parses what `robots.urdf.checks` lets through.
+"""Reads a URDF: yourdfpy reads the joints and inertias that `robots.urdf.checks` lets through.
 
 Left to itself yourdfpy takes for numbers what no other reader does and repairs broken text by
 guesses. It knows no capsules, and keeps matrices for roll, pitch and yaw, with last digits of its
-own; so capsules go to it as cylinders, and poses are composed from the text.
+own; so shapes are read here, and poses are composed from the text.
 """
 
 from __future__ import annotations
 
 import io
 import math
-from copy import deepcopy
 from functools import lru_cache
 from typing import Any
-from xml.etree.ElementTree import Element, tostring
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 from robot_layouts.core.errors import AssetError
 from robot_layouts.kinematics.rotations import Floats, rpy_pose
-from robots.urdf.checks import expect_drivable, expect_readable
-from robots.urdf.model import Inertial, ModelJoint, UrdfModel, UrdfShape
+from robots.urdf.checks import expect_drivable, expect_readable, sizes_of
+from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel, UrdfShape
 from robots.urdf.summary import parse_urdf
 from robots.urdf.text import numbers_of
 
-UNREAD = ("material", "calibration", "safety_controller")  # what no model holds
+UNREAD = ("visual", "collision", "calibration", "safety_controller")  # what it need not read
 
 
 @lru_cache(maxsize=64)
@@ -40,26 +39,24 @@ def read_model(xml: bytes, urdf: str) -> UrdfModel:
     root = parse_urdf(xml, urdf)
     expect_readable(root, urdf)
     robot = _load(root, urdf)
-    links = list(zip(robot.links, root.iterfind("link"), strict=True))
+    links = {link.get("name", ""): link for link in root.iterfind("link")}
+    shapes = {
+        kind: {name: found for name, link in links.items() if (found := _shapes(link, kind, urdf))}
+        for kind in ("collision", "visual")
+    }
     model = UrdfModel(
         name=robot.name,
-        links=tuple(link.name for link in robot.links),
+        links=tuple(links),
         joints=tuple(map(_joint, robot.joints, root.iterfind("joint"))),
-        collisions={
-            link.name: _shapes(link.collisions, text, "collision", urdf)
-            for link, text in links
-            if link.collisions
-        },
-        visuals={
-            link.name: _shapes(link.visuals, text, "visual", urdf)
-            for link, text in links
-            if link.visuals
-        },
+        collisions=shapes["collision"],
+        visuals=shapes["visual"],
         inertials={
-            link.name: Inertial(
-                link.inertial.mass, _origin(text.find("inertial")), link.inertial.inertia
+            link.name: LinkInertia(
+                link.inertial.mass,
+                _origin(links[link.name].find("inertial")),
+                link.inertial.inertia,
             )
-            for link, text in links
+            for link in robot.links
             if link.inertial
         },
     )
@@ -68,16 +65,13 @@ def read_model(xml: bytes, urdf: str) -> UrdfModel:
 
 
 def _load(root: Element, urdf: str) -> Any:
-    """Return the robot that yourdfpy reads in a ``<robot>``."""
+    """Return the robot that yourdfpy reads in a ``<robot>``, without its shapes."""
     import yourdfpy  # brings trimesh, which takes half a second to load
 
-    plain = deepcopy(root)
-    plain.set("name", root.get("name", ""))
-    for capsule in list(plain.iter("capsule")):
-        capsule.tag = "cylinder"
-    for element in (plain, *plain.iterfind("link/visual"), *plain.iterfind("joint")):
-        for part in [part for part in element if part.tag in UNREAD]:
-            element.remove(part)
+    plain = Element("robot", name=root.get("name", ""))
+    for element in (*root.iterfind("link"), *root.iterfind("joint")):
+        parts = [part for part in element if part.tag not in UNREAD]
+        SubElement(plain, element.tag, element.attrib).extend(parts)
     text = io.BytesIO(tostring(plain, encoding="utf-8"))
     try:
         return yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False).robot
@@ -108,28 +102,17 @@ def _joint(joint: Any, text: Element) -> ModelJoint:
     )
 
 
-def _shapes(shapes: list[Any], link: Element, kind: str, urdf: str) -> tuple[UrdfShape, ...]:
-    return tuple(
-        UrdfShape(
-            kind=next(text.iterfind("geometry/*")).tag,
-            sizes=_sizes(shape.geometry),
-            file="" if shape.geometry.mesh is None else shape.geometry.mesh.filename,
-            origin=_origin(text),
-            where=f"{urdf}, link {link.get('name')!r}",
-        )
-        for shape, text in zip(shapes, link.iterfind(kind), strict=True)
-    )
+def _shapes(link: Element, kind: str, urdf: str) -> tuple[UrdfShape, ...]:
+    where = f"{urdf}, link {link.get('name')!r}"
+    return tuple(_shape(element, where) for element in link.iterfind(kind))
 
 
-def _sizes(geometry: Any) -> tuple[float, ...]:
-    if geometry.mesh is not None:
-        scale = geometry.mesh.scale
-        return (1.0, 1.0, 1.0) if scale is None else tuple(scale.tolist())
-    if geometry.box is not None:
-        return tuple(geometry.box.size.tolist())
-    if geometry.sphere is not None:
-        return (geometry.sphere.radius,)
-    return (geometry.cylinder.radius, geometry.cylinder.length)
+def _shape(element: Element, where: str) -> UrdfShape:
+    (shape,) = element.iterfind("geometry/*")
+    mesh = shape.tag == "mesh"
+    sizes = numbers_of(shape, "scale", (1.0, 1.0, 1.0), where) if mesh else sizes_of(shape, where)
+    file = shape.get("filename", "") if mesh else ""
+    return UrdfShape(shape.tag, tuple(sizes), file, _origin(element), where)
 
 
 def _origin(text: Element | None) -> Floats:

@@ -40,7 +40,7 @@ def srdf_beside(urdf: Path) -> Path | None:
 
 
 @dataclass(frozen=True)
-class Group:
+class SrdfGroup:
     """A group of an SRDF, such as an arm or a hand.
 
     Attributes:
@@ -82,7 +82,7 @@ class Semantics:
         excluded: Pairs of links that are left out of collision checks.
     """
 
-    groups: Mapping[str, Group]
+    groups: Mapping[str, SrdfGroup]
     end_effectors: tuple[EndEffector, ...]
     states: Mapping[str, Mapping[str, float]]
     excluded: tuple[ExcludedPair, ...]
@@ -119,7 +119,7 @@ class _Reading:
         self._joints = {joint.name for joint in model.joints}
         self._joints |= {joint.get("name", "") for joint in root.iterfind("virtual_joint")}
 
-    def group(self, name: str, inside: tuple[str, ...] = ()) -> Group:
+    def group(self, name: str, inside: tuple[str, ...] = ()) -> SrdfGroup:
         if name in inside:
             raise AssetError(f"{self._srdf}: the group {name!r} is made of itself")
         element = self.elements[self._known(name, "group", self.elements)]
@@ -127,15 +127,17 @@ class _Reading:
         joints = {joint for part in parts for joint in self.group(part, (*inside, name)).joints}
         tips: list[str] = []
         for chain in element.iterfind("chain"):
-            tips.append(self._link(chain.get("tip_link", "")))
-            joints |= self._chain(self._link(chain.get("base_link", "")), tips[-1])
+            base, tip = (self._link(chain.get(end, "")) for end in ("base_link", "tip_link"))
+            ways = [{joint.name for joint in self._model.path_to(link)} for link in (base, tip)]
+            joints |= ways[0] ^ ways[1]
+            tips.append(tip)
         for joint in element.iterfind("joint"):
             joints.add(self._known(joint.get("name", ""), "joint", self._joints))
         for link in element.iterfind("link"):
             carrier = self._model.parent_joint.get(self._link(link.get("name", "")))
             joints |= {carrier.name} if carrier else set()
         moving = tuple(j.name for j in self._model.ordered if j.moves and j.name in joints)
-        return Group(name, moving, tips[0] if len(tips) == 1 else "", parts)
+        return SrdfGroup(name, moving, tips[0] if len(tips) == 1 else "", parts)
 
     def end_effector(self, element: Element) -> EndEffector:
         group = self._known(element.get("group", ""), "group", self.elements)
@@ -158,10 +160,6 @@ class _Reading:
                     states.setdefault(name, {})[known] = value
         moving = {joint.name for joint in self._model.moving}
         return {n: {j: x for j, x in at.items() if j in moving} for n, at in states.items() if n}
-
-    def _chain(self, base: str, tip: str) -> set[str]:
-        ways = [{joint.name for joint in self._model.path_to(link)} for link in (base, tip)]
-        return ways[0] ^ ways[1]
 
     def _link(self, name: str) -> str:
         return self._known(name, "link", self._model.links)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import posixpath
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -10,8 +12,9 @@ from xml.etree import ElementTree
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import read_regular
 from robots.urdf.cleaning.cleaning import Cleaned, clean, is_template
+from robots.urdf.cleaning.references import find_package, package_of
 from robots.urdf.cleaning.xacro_files import XACRO, expand, template_of
-from robots.urdf.paths import Exists, resolve
+from robots.urdf.paths import Exists, is_allowed, resolve
 from robots.urdf.text import parse_xml
 
 MAX_URDF_BYTES = 32 << 20
@@ -103,13 +106,49 @@ def read_references(xml: bytes, urdf: str, exists: Exists = lambda path: False) 
             `robots.urdf.paths`.
     """
     found = {
-        kind: {resolve(file, urdf, exists) for file in files}
+        kind: {resolve(file, urdf, exists) for file in sorted(files)}
         for kind, files in _named_files(xml, urdf).items()
     }
     return UrdfReferences(
         collision=tuple(sorted(found["collision"])),
         visual=tuple(sorted(found["visual"] - found["collision"])),
     )
+
+
+def expect_files(xml: bytes, urdf: str, *, pictures: bool) -> None:
+    """Refuse a URDF that lacks files which it refers to.
+
+    Args:
+        xml: The URDF's contents.
+        urdf: Its absolute path.
+        pictures: Whether the visual meshes are needed too.
+
+    Raises:
+        AssetError: As `read_references`, or if a file is not there; says of a package that is not
+            there what to do about it.
+    """
+    named = _named_files(xml, urdf)
+    wanted = named["collision"] | (named["visual"] if pictures else set())
+    paths = {file: resolve(file, urdf, os.path.isfile) for file in sorted(wanted)}
+    missing = {file: path for file, path in paths.items() if not os.path.isfile(path)}
+    for package in filter(None, map(package_of, missing)):
+        found = find_package(package, posixpath.dirname(urdf))
+        if not found:
+            raise AssetError(
+                f"{urdf} refers to files of the package {package!r}, which is neither around nor"
+                " beside it, nor in its workspace: put it there, with its package.xml, or name the"
+                " folder that it lies in: folder=… (--folder DIR)"
+            )
+        if not os.path.isfile(f"{found}/package.xml") and not is_allowed(
+            f"{found}/", posixpath.dirname(urdf), os.path.isfile
+        ):
+            raise AssetError(
+                f"{urdf} refers to files of the package {package!r}; {found} is called so, but has"
+                f" no package.xml: put one there, or let it be read with folder={found!r}"
+            )
+    if missing:
+        listing = ", ".join(sorted(set(missing.values())))
+        raise AssetError(f"{urdf} refers to files that do not exist: {listing}")
 
 
 @lru_cache(maxsize=64)

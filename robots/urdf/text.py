@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -127,21 +127,3 @@ def expect_numbers(element: Element, counts: Mapping[str, Mapping[str, int]], wh
         found = element.find(part)
         for attribute in attributes if found is not None else ():
             numbers_of(found, attribute, (0.0,) * attributes[attribute], where)
-
-
-def rename(element: Element, name: Callable[[str], str], file: Callable[[str], str]) -> None:
-    """Give a link, joint or material, and what it refers to, other names.
-
-    Args:
-        element: An element directly below ``<robot>``; it is changed.
-        name: Returns the new name of a link, joint or material.
-        file: Returns the new path of a mesh or texture.
-    """
-    names = [(element, "name"), *((part, "name") for part in element.iter("material"))]
-    names += [(part, "link") for part in element if part.tag in ("parent", "child")]
-    names += [(part, "joint") for part in element.iterfind("mimic")]
-    for part, key in {id(part): (part, key) for part, key in names}.values():
-        if old := part.get(key):
-            part.set(key, name(old))
-    for part in (*element.iter("mesh"), *element.iter("texture")):
-        part.set("filename", file(part.get("filename", "")))

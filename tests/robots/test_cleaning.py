@@ -109,7 +109,7 @@ def test_a_package_xml_with_entities_names_nothing(tmp_path):
     package.write_text(
         '<!DOCTYPE p [<!ENTITY a "toy_package">]><package><name>&a;</name></package>'
     )
-    with pytest.raises(AssetError, match="files that do not exist"):
+    with pytest.raises(AssetError, match="files of the package 'toy_package', which is neither"):
         guess_descriptor(urdf)
 
 

@@ -13,7 +13,7 @@ from robot_layouts.core.errors import UnwritableFileError
 from robot_layouts.kinematics.rotations import pose_matrix
 from robot_layouts.simulation import Simulation
 from robots import CameraMount, DescriptorError, RobotRegistry, UnknownNameError
-from robots.assets.assembled import AssembledUrdf, Part
+from robots.assets.assembled import AssembledUrdf, UrdfPart
 from robots.assets.locator import LocalUrdf
 from robots.grafting import Mount, on_body, with_camera, with_gripper, with_tool
 from robots.urdf.reading import read_model
@@ -115,12 +115,18 @@ class TestGrippers:
         _, after = stepped(arm, closing, 20)
         assert (after[-2:] < 0.005).all()
 
-    def test_a_gripper_that_is_built_in_stays(self):
-        with pytest.raises(
-            DescriptorError,
-            match="so100 cannot be taken off: no fixed joint",
-        ):
-            with_gripper(RobotRegistry.load("so100"), "panda")
+    def test_fingers_that_hang_on_the_last_link_of_the_arm_are_cut_off(self):
+        own = RobotRegistry.load("so100")
+        arm = with_gripper(own, "panda")
+        gone = set(model_of(own).links) - set(model_of(arm).links)
+        assert gone == {"Moving_Jaw", "Moving_Jaw_tip"}
+        assert model_of(arm).parent_joint["panda_hand"].parent == "Fixed_Jaw"
+        assert arm.joints == (*own.arm_joints, "panda_finger_joint1", "panda_finger_joint2")
+        assert arm.fingers.links == ("panda_leftfinger", "panda_rightfinger")
+
+    def test_fingers_that_hang_on_an_arm_are_not_lent(self):
+        with pytest.raises(DescriptorError, match="so100 cannot lend its gripper: no fixed joint"):
+            with_gripper(PANDA, "so100")
 
     def test_an_arm_that_has_none_lends_none(self):
         with pytest.raises(DescriptorError, match="panda_stick is an arm, and none of its"):
@@ -235,7 +241,7 @@ class TestArmsOnABody:
 
 class TestFiles:
     def test_the_same_parts_make_the_same_file(self, pen, tmp_path):
-        urdf = AssembledUrdf(PANDA.urdf, (Part(LocalUrdf(pen), "panda_hand"),))
+        urdf = AssembledUrdf(PANDA.urdf, (UrdfPart(LocalUrdf(pen), "panda_hand"),))
         first = urdf.locate()
         assert pickle.loads(pickle.dumps(urdf)).locate() == first
         pen.write_text(PEN.replace("0.2", "0.3"))
@@ -252,7 +258,7 @@ class TestFiles:
             "from robots.assets import assembled; from pathlib import Path;"
             "assembled.default_root = lambda: Path(sys.argv[2]);"
             "panda = RobotRegistry.load('panda');"
-            "part = assembled.Part(LocalUrdf(sys.argv[1]), 'panda_hand');"
+            "part = assembled.UrdfPart(LocalUrdf(sys.argv[1]), 'panda_hand');"
             "print(assembled.AssembledUrdf(panda.urdf, (part,)).locate())"
         )
         words = [sys.executable, "-c", code, str(pen), str(tmp_path / "shared")]
@@ -265,10 +271,10 @@ class TestFiles:
     def test_a_folder_that_cannot_be_written(self, pen, tmp_path):
         (tmp_path / "cache").write_text("a file")
         with pytest.raises(UnwritableFileError, match="cannot write .*cache/assembled"):
-            AssembledUrdf(PANDA.urdf, (Part(LocalUrdf(pen), "panda_hand"),)).locate()
+            AssembledUrdf(PANDA.urdf, (UrdfPart(LocalUrdf(pen), "panda_hand"),)).locate()
 
     def test_names_that_are_there_twice(self, pen):
-        part = Part(LocalUrdf(pen), "panda_hand")
+        part = UrdfPart(LocalUrdf(pen), "panda_hand")
         with pytest.raises(DescriptorError, match="has a link 'shaft', and so has"):
             AssembledUrdf(PANDA.urdf, (part, part)).locate()
         with pytest.raises(DescriptorError, match="nothing is left without 'panda_link0'"):

@@ -6,11 +6,15 @@ import dataclasses
 import pickle
 
 import pytest
+import trimesh
 
 from robots import AssetError, UnknownNameError, UrdfLocator
 from robots.assets.locator import FileLocator, LocalUrdf
 from robots.assets.manifest import load_manifest
 from robots.assets.scenery import GROUND_TEXTURE, PACKAGE, TABLE
+from robots.bodies.hulls import read_hulls
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
 
 pytestmark = pytest.mark.usefixtures("store")
 
@@ -68,6 +72,50 @@ def test_a_missing_mesh_is_named_when_it_is_needed(toy):
     (toy.parent / "meshes" / "base.stl").unlink()
     with pytest.raises(AssetError, match=r"do not exist: .*meshes/base\.stl"):
         LocalUrdf(toy).locate()
+
+
+@pytest.fixture
+def apart(tmp_path):
+    """A URDF of one package that refers to a coloured mesh of another, which lies nowhere near."""
+    text = '<robot name="r"><link name="a"><collision><geometry><mesh filename="{}"/></geometry>'
+    text += "</collision></link></robot>"
+    urdf = tmp_path / "ws" / "src" / "arms" / "arm" / "urdf" / "arm.urdf"
+    urdf.parent.mkdir(parents=True)
+    (urdf.parent.parent / "package.xml").write_text("<package><name>arm</name></package>")
+    urdf.write_text(text.format("package://grip/meshes/a.obj"))
+    grip = tmp_path / "elsewhere" / "grip"
+    (grip / "meshes").mkdir(parents=True)
+    box = trimesh.creation.box((0.1, 0.2, 0.3)).export(file_type="obj")
+    (grip / "meshes" / "a.obj").write_text(f"mtllib ../a.mtl\n{box}")
+    (grip / "a.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    return urdf, grip
+
+
+def test_a_package_of_the_workspace_is_found_with_its_colours(apart):
+    urdf, grip = apart
+    (grip / "package.xml").write_text("<package><name>grip</name></package>")
+    grip.parent.rename(urdf.parents[3] / "hands")
+    (shape,) = read_model(read_urdf(LocalUrdf(urdf).locate()), str(urdf)).collisions["a"]
+    assert shape.file == "package://hands/grip/meshes/a.obj"
+    assert read_hulls(read_model(read_urdf(urdf), str(urdf)), urdf)
+
+
+def test_a_package_that_is_not_there_is_named_and_a_folder_may_be(apart):
+    urdf, grip = apart
+    with pytest.raises(AssetError, match=r"package 'grip', which is neither around nor.* folder=…"):
+        LocalUrdf(urdf).locate()
+    with pytest.raises(AssetError, match="folder='.*gone' is no folder"):
+        LocalUrdf(urdf, folder="gone").locate()
+    assert LocalUrdf(urdf, folder=grip.parent).locate() == urdf
+    assert read_hulls(read_model(read_urdf(urdf), str(urdf)), urdf)
+
+
+def test_a_folder_of_a_packages_name_needs_its_package_xml(apart):
+    urdf, grip = apart
+    grip.rename(urdf.parents[2] / "grip")
+    with pytest.raises(AssetError, match=r"/arms/grip is called so, but has no package\.xml"):
+        LocalUrdf(urdf).locate()
+    assert LocalUrdf(urdf, folder=urdf.parents[2] / "grip").locate() == urdf
 
 
 def test_the_files_of_the_scenery_come_together(store, fill):

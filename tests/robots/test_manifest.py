@@ -12,7 +12,7 @@ import pytest
 from robot_layouts.core.paths import CHECKOUT_CACHE
 from robots import AssetError, UnknownNameError, write_manifest
 from robots.assets import manifest
-from robots.assets.manifest import LARGEST_FILE, Manifest, load_manifest
+from robots.assets.manifest import LARGEST_FILE, AssetManifest, load_manifest
 from robots.assets.packages import find_package
 from robots.write_manifest import build_package
 
@@ -25,7 +25,7 @@ def _fresh_manifest():
 
 
 def test_the_manifest_survives_writing_and_reading():
-    assert Manifest.from_json(load_manifest().to_json()) == load_manifest()
+    assert AssetManifest.from_json(load_manifest().to_json()) == load_manifest()
 
 
 def test_the_tracked_manifest_is_what_mani_skill_holds(capsys):

@@ -28,6 +28,11 @@ from robots.urdf.summary import read_urdf
 
 from .mjcf_parts import JAWS, arm, mjcf, motors, write
 
+DRAWN = 'contype="0" conaffinity="0"'
+CRUMB = trimesh.creation.box((1e-6, 1e-6, 1e-6))
+SHEET = trimesh.creation.box((0.1, 0.1, 0.0))
+TRIANGLE = trimesh.Trimesh(np.eye(3), [[0, 1, 2]])
+
 
 @pytest.fixture(autouse=True)
 def _local_copy(tmp_path_factory, monkeypatch):
@@ -98,6 +103,46 @@ class TestWhatIsGuessed:
     def test_a_base_that_flies_is_fixed(self, tmp_path):
         path = write(tmp_path, mjcf(arm(inside='<freejoint name="fly"/>')))
         assert "'fly', by which the whole robot flies freely, is fixed" in reasons(path)
+
+    def test_ranges_of_radians_that_are_read_as_degrees_are_doubted(self, tmp_path):
+        tiny = arm().replace('range="-100 100"', 'range="-1.7 1.7"')
+        about = reasons(write(tmp_path, mjcf(tiny)))
+        assert "no hinge turns by more than 3.4°, so the ranges seem to be in radians" in about
+        assert "seem to be in radians" not in reasons(write(tmp_path, mjcf(arm())))
+
+    @pytest.mark.parametrize(
+        ("lid", "use", "what"),
+        [
+            (CRUMB, "", "the mesh 'lid' has no volume, so it is a shell"),
+            (SHEET, DRAWN, "the mesh 'lid' has no volume, so it is a shell"),
+            (TRIANGLE, DRAWN, "left out: the mesh 'lid', which is only drawn"),
+            (SHEET, "", None),
+            (TRIANGLE, "", None),
+        ],
+    )
+    def test_a_mesh_that_is_too_thin(self, lid, use, what, tmp_path):
+        lid.export(tmp_path / "lid.obj")
+        geom = f'<geom type="mesh" mesh="lid" {use}/>'
+        path = write(tmp_path, mjcf(arm(inside=geom), '<asset><mesh file="lid.obj"/></asset>'))
+        if what is None:
+            with pytest.raises(AssetError, match="MuJoCo cannot compile"):
+                guess_descriptor(path)
+        else:
+            assert what in reasons(path)
+            kept = [] if what.startswith("left out") else ["mesh"]
+            assert [shape.kind for shape in urdf_of(path).visuals["base"]] == [*kept, "box"]
+
+    def test_what_lies_elsewhere_is_read_from_a_folder_that_is_named(self, tmp_path, capsys):
+        far, own = tmp_path / "far", tmp_path / "own"
+        far.mkdir(), own.mkdir()
+        trimesh.creation.box((0.2, 0.1, 0.06)).export(far / "box.stl")
+        assets = '<asset><mesh file="../far/box.stl"/></asset>'
+        path = write(own, mjcf(arm(inside='<geom type="mesh" mesh="box"/>'), assets))
+        with pytest.raises(AssetError, match=r"leads out of .* folder=… \(--folder DIR\)"):
+            guess_descriptor(path)
+        assert main([str(path), "--folder", str(far)]) == 0
+        robot = RobotDescriptor.from_mjcf(path, quiet=True, folder=far)
+        assert robot.urdf == LocalMjcf(str(path), str(far))
 
     def test_two_arms_are_limbs(self, tmp_path):
         both = arm("left_", at="0 0.4 0") + arm("right_", at="0 -0.4 0")

@@ -28,11 +28,12 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_it_holds_a_path_relative_to_itself(folder, monkeypatch, capsys):
-    assert main(["robot.urdf", "--out", "robots/own"]) == 0
+    assert main(["robot.urdf", "--out", "robots/own", "--folder", ".."]) == 0
     assert "made:MADE" in capsys.readouterr().err
     source = (folder / "robots" / "own" / "made.py").read_text()
     assert str(folder) not in source
-    assert 'LocalUrdf(path=Path(__file__).parent / "../../robot.urdf")' in source
+    assert 'path=Path(__file__).parent / "../../robot.urdf"' in source
+    assert 'folder=Path(__file__).parent / "../../.."' in source
     moved = folder.parent / "elsewhere"
     shutil.move(folder, moved)
     monkeypatch.chdir("/")

@@ -5,18 +5,26 @@ from __future__ import annotations
 import os
 import posixpath
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from functools import cache
+from itertools import chain
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import read_regular
-from robots.urdf.paths import resolve
+from robots.urdf.paths import (
+    DEEPEST_PACKAGE,
+    is_workspace,
+    opened_folders,
+    parents,
+    resolve,
+)
 from robots.urdf.text import parse_xml
 
 MAX_PACKAGE_BYTES = 1 << 20  # of a package.xml
-MOST_NEIGHBOURS = 500  # folders beside a package that are looked into
+MOST_FOLDERS = 500  # that are looked into on each level of a search for packages
 
 _FIND = re.compile(r"(?:file://)?\$\(find\s+([^)\s]+)\s*\)/*(.*)", re.DOTALL)
 _GAZEBO = "model://"
@@ -49,10 +57,11 @@ def repair_references(root: Element, urdf: str) -> Iterator[str]:
         urdf: Its path; one that is relative refers to nothing on this machine.
     """
     repaired: dict[str, str] = {}
+    packages = cache(lambda name: _packages(name, posixpath.dirname(urdf)))
     for element in (*root.iter("mesh"), *root.iter("texture")):
         reference = element.get("filename", "")
         if reference.strip() and posixpath.isabs(urdf) and not _leads(reference, urdf):
-            found = repaired.get(reference) or next(_meant(reference, urdf), "")
+            found = repaired.get(reference) or next(_meant(reference, urdf, packages), "")
             if found:
                 repaired[reference] = found
                 element.set("filename", found)
@@ -63,14 +72,22 @@ def repair_references(root: Element, urdf: str) -> Iterator[str]:
 
 
 def find_package(name: str, folder: str) -> str:
-    """Return the folder of a package around or beside a folder; nothing if there is none.
+    """Return the folder of a package; nothing if there is none.
+
+    It is looked for around and beside a folder, in its workspace, and in what was opened to it.
 
     Args:
         name: As its package.xml gives it, or else its folder.
         folder: Absolute path.
     """
-    named = (f"{parent}/{name}" for parent in _around(folder))
-    return next(_packages(name, folder), "") or next(filter(os.path.isdir, named), "")
+    named = (f"{parent}/{name}" for parent in _holders(folder))
+    return next(chain(_packages(name, folder), filter(os.path.isdir, named)), "")
+
+
+def package_of(reference: str) -> str:
+    """Return the name of the package that a reference names; nothing if it names none."""
+    text = next(_spellings(reference))
+    return text.removeprefix("package://").partition("/")[0] if "package://" in text else ""
 
 
 def _leads(reference: str, urdf: str) -> bool:
@@ -81,17 +98,19 @@ def _leads(reference: str, urdf: str) -> bool:
         return False
 
 
-def _meant(reference: str, urdf: str) -> Iterator[str]:
+def _meant(reference: str, urdf: str, packages: Callable[[str], list[str]]) -> Iterator[str]:
     """Yield references to files that a reference may mean, none of which leads where it may not."""
     folder = posixpath.dirname(urdf)
     for text in dict.fromkeys(_spellings(reference)):
         if _leads(text, urdf):
             yield text
-        for path, package in _paths(text, folder):
+        for path, package in _paths(text, folder, packages):
             if found := _on_disk(path):
                 near = Path(os.path.relpath(found, folder)).as_posix()
-                far = f"package://{posixpath.relpath(found, posixpath.dirname(package))}"
-                yield from (other for other in (near, package and far) if _leads(other, urdf))
+                holder = posixpath.commonpath((folder, package)) if package else ""
+                holder = posixpath.dirname(package) if holder == package else holder
+                far = f"package://{posixpath.relpath(found, holder)}" if package else ""
+                yield from (other for other in (near, far) if other and _leads(other, urdf))
 
 
 def _spellings(reference: str) -> Iterator[str]:
@@ -108,7 +127,9 @@ def _spellings(reference: str) -> Iterator[str]:
         yield text.removeprefix("file://")
 
 
-def _paths(reference: str, folder: str) -> Iterator[tuple[str, str]]:
+def _paths(
+    reference: str, folder: str, packages: Callable[[str], list[str]]
+) -> Iterator[tuple[str, str]]:
     """Yield absolute paths that a reference may mean, and the package that it names, if any.
 
     The case of letters is not yet that of the files. No ``..`` leads out of a package.
@@ -118,37 +139,50 @@ def _paths(reference: str, folder: str) -> Iterator[tuple[str, str]]:
         yield posixpath.normpath(posixpath.join(folder, reference)), ""
     elif scheme == "package" and ".." not in rest.split("/"):
         name, _, inside = rest.partition("/")
-        for package in _packages(name, folder):
+        named = [
+            f"{holder}/{entry}"
+            for holder in _holders(folder)
+            for entry in _listing(holder)
+            if entry.lower() == name.lower()
+        ]
+        for package in (*packages(name), *named):
             yield posixpath.normpath(f"{package}/{inside}"), package
-        for parent in _around(folder):
-            for entry in _listing(parent):
-                if entry.lower() == name.lower():
-                    yield posixpath.normpath(f"{parent}/{entry}/{inside}"), f"{parent}/{entry}"
 
 
-def _packages(name: str, folder: str) -> Iterator[str]:
-    """Yield the folders whose package.xml has a name: around a folder, in it and near its package.
+def _holders(folder: str) -> list[str]:
+    """Return the folders in which packages may lie: around a folder, and what was opened to it."""
+    opened = opened_folders(folder)
+    return [folder, *parents(folder)[:-1], *opened, *map(posixpath.dirname, opened)]
 
-    The package is the nearest folder around with a package.xml; where there is none, the folder.
+
+def _packages(name: str, folder: str) -> list[str]:
+    """Return the folders whose package.xml has a name.
+
+    They lie around a folder, in it or near its package; else in its workspace, or in what was
+    opened to it. The package is the nearest folder around with a package.xml; where there is none,
+    the folder.
     """
-    around = list(_around(folder))
-    packages = [parent for parent in around if os.path.isfile(f"{parent}/package.xml")]
-    own = packages[0] if packages else folder
-    beside = [
-        near for place in (folder, own, posixpath.dirname(own)) for near in _neighbours(place)
-    ]
-    yield from (place for place in (*packages, *beside) if _package_name(place) == name)
+    around = [folder, *parents(folder)]
+    own = [parent for parent in around if os.path.isfile(f"{parent}/package.xml")]
+    beside = own[0] if own else folder
+    near = (_below(place, 1) for place in (folder, beside, posixpath.dirname(beside)))
+    workspaces = [parent for parent in around if is_workspace(parent, os.path.exists)]
+    far = (_below(place, DEEPEST_PACKAGE) for place in (*workspaces, *opened_folders(folder)))
+    found = [place for place in chain(own, *near) if _package_name(place) == name]
+    return found or [place for place in chain(*far) if _package_name(place) == name]
 
 
-def _around(folder: str) -> Iterator[str]:
-    while posixpath.dirname(folder) != folder:
-        yield folder
-        folder = posixpath.dirname(folder)
-
-
-def _neighbours(folder: str) -> list[str]:
-    names = _listing(folder)[:MOST_NEIGHBOURS]
-    return [f"{folder}/{name}" for name in names if os.path.isfile(f"{folder}/{name}/package.xml")]
+def _below(folder: str, levels: int) -> Iterator[str]:
+    """Yield the folders with a package.xml below a folder; none is looked for in another."""
+    waiting = [folder]
+    for _ in range(levels):
+        inner = [f"{place}/{name}" for place in waiting for name in _listing(place)[:MOST_FOLDERS]]
+        waiting = []
+        for place in inner[:MOST_FOLDERS]:
+            if os.path.isfile(f"{place}/package.xml"):
+                yield place
+            elif os.path.isdir(place):
+                waiting.append(place)
 
 
 def _package_name(folder: str) -> str:

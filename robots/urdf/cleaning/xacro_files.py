@@ -133,12 +133,12 @@ def _expand(template: Path, arguments: Mapping[str, str]) -> Expansion:
             files = () if lost.packages else (str(template), *xacro.all_includes)
     except (Exception, SystemExit) as error:  # whatever a template's expressions raise
         message = " ".join(f"{error or type(error).__name__} {printed.getvalue()}".split())
-        advice = lost.advice(lost.packages, template)
+        advice = _advice(lost.packages, template)
         raise AssetError(f"xacro cannot expand {template}: {message[:300]}{advice}") from error
     meshes = [mesh.get("filename", "") for mesh in fromstring(xml).iterfind(".//collision//mesh")]
     needed = [name for name in lost.packages if any(f"$(find {name})" in file for file in meshes)]
     if needed:
-        raise AssetError(f"{template} refers to meshes elsewhere{lost.advice(needed, template)}")
+        raise AssetError(f"{template} refers to meshes elsewhere{_advice(needed, template)}")
     return Expansion(xml, values, tuple(lost.includes), _times(files))
 
 
@@ -149,17 +149,18 @@ class _Lost:
     packages: dict[str, None] = field(default_factory=dict[str, None])
     includes: list[str] = field(default_factory=list[str])
 
-    @staticmethod
-    def advice(packages: Iterable[str], template: Path) -> str:
-        """Return what to do about packages, as the end of a message."""
-        named = ", ".join(map(repr, packages))
-        if not named:
-            return ""
-        there = "is" if "," not in named else "are"
-        return (
-            f"; the package {named} {there} not there: put it beside {template.name} or beside its"
-            " package, in a folder of that name or with its package.xml"
-        )
+
+def _advice(packages: Iterable[str], template: Path) -> str:
+    """Return what to do about packages that are not there, as the end of a message."""
+    named = ", ".join(map(repr, packages))
+    if not named:
+        return ""
+    there = "is" if "," not in named else "are"
+    return (
+        f"; the package {named} {there} not there: put it beside {template.name} or beside its"
+        " package, in a folder of that name or with its package.xml, or name the folder that it"
+        " lies in: folder=… (--folder DIR)"
+    )
 
 
 def _package(template: Path) -> Any:

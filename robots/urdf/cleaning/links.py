@@ -1,0 +1,262 @@
+"""Repairs links of a URDF: shapes in elements of their own, and inertias that a body can have."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from copy import deepcopy
+from typing import TYPE_CHECKING, Any
+from xml.etree.ElementTree import Element, SubElement
+
+from robot_layouts.core.errors import AssetError
+from robots.urdf.checks import (
+    MOMENTS,
+    PRODUCTS,
+    SMALLEST,
+    SMALLEST_SIZE,
+    attributes_of,
+    expect_inertia,
+    moved_links,
+    sizes_of,
+)
+from robots.urdf.mesh_files import has_body, read_corners
+from robots.urdf.model import SIZES
+from robots.urdf.paths import resolve
+from robots.urdf.text import numbers_of
+
+if TYPE_CHECKING:
+    from robot_layouts.kinematics.rotations import Floats
+
+KINDS = ("visual", "collision")
+DENSITY = 1000.0  # kg/m³; what SAPIEN takes for collision shapes
+THINNEST = 1e-3  # m; of a body whose shapes are thinner
+
+Size = tuple[float, float, float]
+
+
+def repair_shapes(root: Element, urdf: str) -> Iterator[str]:
+    """Take shapes apart, leave out those without extent, and yield what was done.
+
+    Args:
+        root: The ``<robot>``.
+        urdf: Its path, by which it refers to meshes.
+    """
+    for link in root.iterfind("link"):
+        name = link.get("name")
+        for kind in KINDS:
+            yield from _take_apart(link, kind)
+            for element in link.findall(kind):
+                yield from _repair_geometry(element, f"link {name!r}: a {kind}")
+                if reason := _why_nothing(element, kind, f"{urdf}, link {name!r}", urdf):
+                    link.remove(element)
+                    yield f"link {name!r}: a {kind} {reason}, left out"
+
+
+def _take_apart(link: Element, kind: str) -> Iterator[str]:
+    """Make elements of one shape each of one that has several."""
+    for element in link.findall(kind):
+        shapes = element.findall("geometry/*")
+        if len(shapes) < 2 or any(shape.tag not in SIZES for shape in shapes):
+            continue
+        place = list(link).index(element)
+        link.remove(element)
+        for old in element.findall("geometry"):
+            element.remove(old)
+        for number, shape in enumerate(shapes):
+            own = deepcopy(element)
+            SubElement(own, "geometry").append(shape)
+            link.insert(place + number, own)
+        many = len(shapes)
+        yield f"link {link.get('name')!r}: a {kind} of {many} shapes, taken as {many} {kind}s"
+
+
+def _repair_geometry(element: Element, what: str) -> Iterator[str]:
+    """Leave out what is no shape, and have a mesh scaled by three factors."""
+    geometry = element.find("geometry")
+    parts = [] if geometry is None else list(geometry)
+    strange = [part for part in parts if part.tag not in SIZES]
+    if geometry is not None and len(strange) == len(parts) - 1:
+        for part in strange:
+            geometry.remove(part)
+            yield f"{what} has a <{part.tag}> beside its shape, left out"
+    for mesh in element.iterfind("geometry/mesh"):
+        factors = mesh.get("scale", "").split()
+        if len(factors) == 1 or len(factors) == 4 and factors[3] in ("1", "1.0"):
+            scale = " ".join((factors * 3)[:3])
+            yield f"{what} has a mesh with scale={mesh.get('scale')!r}, taken as {scale!r}"
+            mesh.set("scale", scale)
+
+
+def _why_nothing(element: Element, kind: str, where: str, urdf: str) -> str:
+    """Return why a ``<collision>`` or ``<visual>`` stands for nothing, or nothing if it may."""
+    shapes = element.findall("geometry/*")
+    if not shapes:
+        return "without a shape"
+    if len(shapes) > 1 or shapes[0].tag not in SIZES:
+        return ""
+    (shape,) = shapes
+    if shape.tag == "mesh":
+        return _why_no_mesh(shape, kind, where, urdf)
+    try:
+        sizes = sizes_of(shape, where)
+    except AssetError:
+        return ""
+    least = SMALLEST_SIZE if kind == "collision" else 0.0
+    if min(sizes) >= 0 and (min(sizes) < least or max(sizes) == 0):
+        return f"of a {shape.tag} with {attributes_of(shape)}, which has no volume"
+    return ""
+
+
+def _why_no_mesh(mesh: Element, kind: str, where: str, urdf: str) -> str:
+    file = mesh.get("filename", "")
+    if not file.strip():
+        return "of a mesh without a file"
+    try:
+        scale = numbers_of(mesh, "scale", (1.0, 1.0, 1.0), where)
+        if 0.0 in scale:
+            return f"of a mesh with {attributes_of(mesh)}, which has no volume"
+        path = resolve(file, urdf, os.path.isfile)
+        if kind == "visual" or not os.path.isfile(path) or has_body(path, scale, where, urdf):
+            return ""
+    except AssetError:
+        return ""
+    return f"of the mesh {file!r}, which has no volume"
+
+
+def repair_inertia(root: Element, urdf: str) -> Iterator[str]:
+    """Replace what no body has by what mass and size of the link give, and yield what was done.
+
+    Args:
+        root: The ``<robot>``.
+        urdf: Its path, by which it refers to meshes.
+    """
+    moved = moved_links(root)
+    for link in root.iterfind("link"):
+        where = f"{urdf}: link {link.get('name', '')!r}"
+        if not _is_possible(link, where, moves=link.get("name") in moved):
+            with suppress(AssetError):  # numbers that are none are refused later
+                yield from _repair(link, where, urdf)
+
+
+def _is_possible(link: Element, where: str, *, moves: bool) -> bool:
+    try:
+        expect_inertia(link, where, moves=moves)
+    except AssetError:
+        return False
+    return True
+
+
+def _repair(link: Element, where: str, urdf: str) -> Iterator[str]:
+    name, inertial = link.get("name"), next(link.iterfind("inertial"))
+    mass, tensor = inertial.find("mass"), inertial.find("inertia")
+    (weight,) = numbers_of(mass, "value", (0.0,), where)
+    numbers = [numbers_of(tensor, key, (0.0,), where)[0] for key in (*MOMENTS, *PRODUCTS)]
+    if weight < 0 or 0 < weight < SMALLEST:
+        return
+    if tensor is not None and (missing := [key for key in PRODUCTS if tensor.get(key) is None]):
+        tensor.attrib.update(dict.fromkeys(missing, "0"))
+        if _is_possible(link, where, moves=True):
+            yield f"link {name!r} has an inertia without {', '.join(missing)}, taken as 0"
+            return
+    size = _size(link, where, urdf)
+    if weight == 0 and link.find("collision") is not None:
+        link.remove(inertial)
+        yield (
+            f"link {name!r} has no mass: mass and inertia follow from its collision shapes and"
+            f" {DENSITY:g} kg/m³"
+        )
+    elif weight == 0 and size is None:
+        link.remove(inertial)
+        yield f"link {name!r} has no mass, so its <inertial> was left out"
+    else:
+        problem = "no inertia"
+        if any(numbers):
+            listing = ", ".join(f"{number:g}" for number in numbers)
+            problem = f"the inertia {listing} kg·m² (xx, yy, zz, xy, xz, yz), which no body has"
+        if not weight:
+            problem = f"no mass: took {DENSITY:g} kg/m³; and {problem}"
+            weight = DENSITY * math.prod(size or (0.0,))
+        _set_box(inertial, weight, size or _ball(weight))
+        yield f"link {name!r} has {problem}: took that of {_in_words(weight, size)}"
+
+
+def _ball(weight: float) -> Size:
+    """Return the edges of a cube that turns as heavily as a ball of a weight (m)."""
+    radius = (3 * weight / (4 * math.pi * DENSITY)) ** (1 / 3)
+    return (radius * math.sqrt(2.4),) * 3
+
+
+def _in_words(weight: float, size: Size | None) -> str:
+    if size is None:
+        return f"a ball of {weight:.3g} kg and {DENSITY:g} kg/m³, as it has no shape"
+    edges = " × ".join(f"{edge:.3g}" for edge in size)
+    return f"a box of {weight:.3g} kg and the size of its shapes, {edges} m"
+
+
+def _set_box(inertial: Element, weight: float, size: Size) -> None:
+    """Make the inertia that of a solid box along the link's axes."""
+    for part in ("mass", "inertia"):
+        for element in inertial.findall(part):
+            inertial.remove(element)
+    origin = inertial.find("origin")
+    if origin is not None:
+        origin.set("rpy", "0 0 0")
+    SubElement(inertial, "mass", value=repr(weight))
+    x, y, z = (edge * edge * weight / 12 for edge in size)
+    moments = {"ixx": y + z, "iyy": x + z, "izz": x + y}
+    numbers = {key: repr(max(moment, SMALLEST)) for key, moment in moments.items()}
+    SubElement(inertial, "inertia", {**numbers, **dict.fromkeys(PRODUCTS, "0")})
+
+
+def _size(link: Element, where: str, urdf: str) -> Size | None:
+    """Return the extents of a link's collision shapes, else of its visuals, or None (m)."""
+    import numpy as np
+
+    for kind in ("collision", "visual"):
+        corners = [
+            made
+            for shape in link.iterfind(kind)
+            if (made := _corners(shape, where, urdf)) is not None
+        ]
+        if corners:
+            x, y, z = np.maximum(np.ptp(np.concatenate(corners), axis=0), THINNEST).tolist()
+            return (x, y, z)
+    return None
+
+
+def _corners(element: Element, where: str, urdf: str) -> Floats | None:
+    """Return the corners of what a shape fills in the link's frame, (n, 3) (m), or None."""
+    import numpy as np
+
+    from robot_layouts.kinematics.rotations import rpy_pose
+
+    try:
+        own = _own_corners(element, where, urdf)
+        origin = element.find("origin")
+        xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
+    except (AssetError, ValueError):
+        return None
+    pose = rpy_pose(xyz, rpy)
+    return np.asarray(own) @ pose[:3, :3].T + pose[:3, 3]
+
+
+def _own_corners(element: Element, where: str, urdf: str) -> Any:
+    (shape,) = element.findall("geometry/*")
+    if shape.tag == "mesh":
+        scale = numbers_of(shape, "scale", (1.0, 1.0, 1.0), where)
+        path = resolve(shape.get("filename", ""), urdf, os.path.isfile)
+        return read_corners(path, scale, where, urdf)
+    x, y, z = (edge / 2 for edge in _edges(shape.tag, sizes_of(shape, where)))
+    return [(a, b, c) for a in (-x, x) for b in (-y, y) for c in (-z, z)]
+
+
+def _edges(kind: str, sizes: list[float]) -> Size:
+    if kind == "box":
+        x, y, z = sizes
+        return (x, y, z)
+    diameter = 2 * sizes[0]
+    if kind == "sphere":
+        return (diameter, diameter, diameter)
+    return (diameter, diameter, sizes[1] + (diameter if kind == "capsule" else 0.0))
