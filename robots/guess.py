@@ -231,8 +231,8 @@ def _wheels(parts: _Parts) -> tuple[str, ...]:
 
 
 def _fingers(parts: _Parts, limb: Limb) -> tuple[Fingers | None, str]:
-    opened = parts.grippers[limb.name].postures[0] if limb.fingers else {}
-    return find_fingers(limb, parts.tips.get(limb.name), opened)
+    postures = parts.grippers[limb.name].postures if limb.fingers else ()
+    return find_fingers(limb, parts.tips.get(limb.name), postures)
 
 
 def _limbs(parts: _Parts, rest: Mapping[str, float]) -> dict[str, LimbDescription]:

@@ -22,7 +22,6 @@ from robots.urdf.tree import kinematic_tree
 
 BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
 EXACT = 0.02  # m; farther away, the reason says so
-OPPOSITE = ("index", "middle")  # fingers that a thumb meets, the first one first
 BLIND = (*words.HEAD, "optical", "imu", "ft", "force", "torque", "inertia", "range", "led")
 STARTS = 8  # of the search for the reach
 
@@ -181,15 +180,8 @@ def _seen_from(stance: Stance, link: str, place: Floats) -> Vector3:
 
 
 def _grasping(stance: Stance, tips: Fingertips) -> tuple[str, ...]:
-    """Return the frame at the tip of each finger that grasps: all, or a thumb and its opposite."""
-    frames = {end: _frame_at(stance, tips, end) for end in tips.ends}
-    thumbs = [end for end in tips.ends if tips.is_thumb(end)]
-    others = [end for end in tips.ends if end not in thumbs]
-    if not thumbs or not others:
-        return tuple(frames.values())
-    named = [[end for end in others if tips.is_called(end, word)] for word in OPPOSITE]
-    opposite = next((ends[0] for ends in named if ends), others[0])
-    return (frames[thumbs[0]], frames[opposite])
+    """Return the frame at the tip of each finger that grasps."""
+    return tuple(_frame_at(stance, tips, end) for end in tips.grasping() or tips.ends)
 
 
 def _frame_at(stance: Stance, tips: Fingertips, end: str) -> str:

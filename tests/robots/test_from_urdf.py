@@ -127,7 +127,7 @@ class TestWhatIsSaid:
             "TCP: the link panda_hand_tcp, named like tcp",
             "drives: stiffness from the inertia that hangs on each joint",
             "keyframe 'rest': ",
-            "fingers: both slide along their y axis",
+            "fingers: panda_leftfinger and panda_rightfinger slide open along their y axis",
             "reach: the TCP's largest distance",
         ):
             assert f"\n  {reason}" in said

@@ -285,6 +285,70 @@ class TestHands:
         assert "gripper" not in joints_of(guess(parts, tmp_path))
 
 
+def sliding(parts: Parts, palm: str, way: tuple[float, float, float]) -> None:
+    """Add two fingers whose frames are the palm's and that slide apart along a direction."""
+    for name, sign in (("one", 1), ("two", -1)):
+        x, y, z = (sign * part for part in way)
+        parts.link(f"finger_{name}", 0.05, "0.06 0.01 0.01", "0.03 0 0")
+        parts.joint(
+            f"slide_{name}", palm, f"finger_{name}", f"{0.05 + x / 100} {y / 100} {z / 100}",
+            axis=f"{x} {y} {z}", limits=(0.0, 0.03), kind="prismatic",
+        )  # fmt: skip
+
+
+class TestFingers:
+    @pytest.mark.parametrize(
+        ("way", "axis"),
+        [
+            ((0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+            ((0.0, 0.8, 0.6), (0.0, 1.0, 0.0)),  # near enough
+            ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
+            ((0.0, 0.6, 0.8), (0.0, 0.6, 0.8)),
+        ],
+    )
+    def test_fingers_open_the_way_their_tips_part(self, tmp_path, way, axis):
+        parts, last = single_arm(end="")
+        sliding(parts, last, way)
+        fingers = guess(parts, tmp_path).descriptor.fingers
+        assert fingers.links == ("finger_one", "finger_two")
+        assert fingers.opening_signs == (1, -1)
+        assert fingers.opening_axes == (axis, axis)
+
+    def test_a_jaw_opens_across_the_way_from_its_hinge(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.link("jaw", 0.05, "0.08 0.01 0.02", "0.05 0 0")
+        parts.joint("jaw_joint", last, "jaw", "0.03 0 0.03", axis="0 -1 0", limits=(0.0, 1.0))
+        fingers = guess(parts, tmp_path).descriptor.fingers
+        assert fingers.links == (last, "jaw")
+        assert fingers.max_angle == 110.0
+        signed = np.array(fingers.opening_axes) * np.array(fingers.opening_signs)[:, None]
+        assert signed[1] @ (0.0, 0.0, 1.0) > 0.95
+        assert signed[0] @ (0.0, 0.0, -1.0) > 0.8
+
+    def test_a_thumb_grasps_with_the_finger_that_it_meets(self, tmp_path):
+        parts, last = single_arm(end="")
+        for name, y, z, axis in (
+            ("ring", -0.02, 0.03, 1), ("thumb", 0.0, -0.03, -1), ("index", 0.02, 0.03, 1)
+        ):  # fmt: skip
+            parts.link(name, 0.02, "0.06 0.01 0.01", "0.03 0 0")
+            parts.joint(f"{name}_joint", last, name, f"0.05 {y} {z}", axis=f"0 {axis} 0",
+                        limits=(0.0, 0.8))  # fmt: skip
+        fingers = guess(parts, tmp_path).descriptor.fingers
+        assert fingers.links == ("thumb", "index")
+        assert fingers.opening_signs == (-1, 1)
+        assert fingers.opening_axes[0][2] > 0.9
+
+    def test_a_reason_says_how_fingers_are_given(self, tmp_path):
+        parts, last = single_arm(end="")
+        for i, y in enumerate((-0.03, 0.0, 0.03)):
+            parts.link(f"n{i}", 0.02, "0.03 0.01 0.01", "0.015 0 0")
+            parts.joint(f"root{i}", last, f"n{i}", f"0.05 {y} 0", axis="0 1 0", limits=(0.0, 1.5))
+        found = guess(parts, tmp_path)
+        assert found.descriptor.fingers is None
+        reason = next(r for r in found.reasons if r.startswith("fingers"))
+        assert "fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS))" in reason
+
+
 class TestTool:
     def test_a_frame_between_the_fingers_goes_before_the_palm(self, tmp_path):
         parts, last = single_arm(end="")
