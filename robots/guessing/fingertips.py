@@ -56,6 +56,11 @@ class Fingertips:
             self.ends = (limb.palm, *self.ends)
         self._tips = {link: tips[link] for link in self.ends}
 
+    @property
+    def are_jaws(self) -> bool:
+        """Whether there are two, and shapes tell where they are: so they meet in one place."""
+        return self.solid and len(self.ends) == 2
+
     def middle(self) -> Floats:
         """Return the place between the tips, in the root's frame, (3,) (m).
 

@@ -22,6 +22,7 @@ from robots.urdf.tree import kinematic_tree
 
 BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
 EXACT = 0.02  # m; farther away, the reason says so
+CLOSE = 0.01  # m; the farthest that a TCP may be from the place between two tips that are known
 BLIND = (*words.HEAD, "optical", "imu", "ft", "force", "torque", "inertia", "range", "led")
 STARTS = 8  # of the search for the reach
 
@@ -134,10 +135,9 @@ def _between(
         ends = [link for link in ends if link not in still]
     named = min(((off((link,)), link) for link in ends), default=(np.inf, ""))
     if named[0] <= BETWEEN:
-        reason = f"{which}: the link {named[1]}, which lies between the finger tips"
-        return Tool(named[1], (), reason)
+        return _named(stance, tips, which, named[1], named[0])
     frames = _grasping(stance, tips)
-    if off(frames) <= near:
+    if off(frames) <= (CLOSE if tips.are_jaws else near):
         return _mean(stance, limb, frames, which, off(frames), middle)
     if tips.solid:
         return _beside(stance, limb, which, off((limb.palm,)), middle)
@@ -148,6 +148,14 @@ def _between(
     only = ", which is only the palm" if best == (limb.palm,) else ", the nearest to the tips"
     apart = _apart(distance, _seen_from(stance, best[0], middle))
     return Tool(best[0], (), f"{which}: the link {best[0]}{only}{apart}")
+
+
+def _named(stance: Stance, tips: Fingertips, which: str, link: str, distance: float) -> Tool:
+    """Return a named frame, or the place between the tips beside it if these are known better."""
+    if distance <= CLOSE or not tips.are_jaws:
+        return Tool(link, (), f"{which}: the link {link}, which lies between the finger tips")
+    reason = f"{which}: {distance * 100:.0f} cm from the link {link}, where the finger tips meet"
+    return Tool(link, (), reason, _seen_from(stance, link, tips.middle()))
 
 
 def _mean(

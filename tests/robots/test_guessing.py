@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from robots import RobotDescriptor
+from robots import LocalUrdf, RobotDescriptor
 from robots.bodies.hulls import load_model
 from robots.bodies.overlaps import overlapping
 from robots.from_urdf import Guess, guess_descriptor
+from robots.guess import guess as guess_robot
+from robots.guessing.hints import Hints
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from tests.robots.urdf_parts import Parts
@@ -382,6 +385,15 @@ class TestTool:
         reason = next(r for r in found.reasons if r.startswith("TCP"))
         assert reason.startswith("TCP: 30 cm from the link a_link6, where the finger tips meet")
 
+    def test_a_frame_that_is_not_between_the_tips_is_moved_there(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.jaws(last, "a")  # whose tips meet 0.106 m ahead
+        parts.frame("ee_link", last, "0.08 0.005 0")
+        found = guess(parts, tmp_path)
+        assert found.descriptor.tcp_link == "ee_link"
+        np.testing.assert_allclose(found.descriptor.tcp_offset, (0.026, -0.005, 0), atol=0.005)
+        assert any(r.startswith("TCP: 3 cm from the link ee_link") for r in found.reasons)
+
     @pytest.mark.parametrize("end", ["tool0", "ee_link", "suction_cup", "flange"])
     def test_an_arm_without_gripper_ends_in_its_tool(self, tmp_path, end):
         parts, last = single_arm(end)
@@ -428,6 +440,73 @@ class TestPosture:
         found = guess(parts, tmp_path)
         assert found.descriptor.keyframe("rest") == (0.0,) * 6
         assert any("keyframe 'rest': joints at 0" in reason for reason in found.reasons)
+
+    @pytest.mark.parametrize(
+        ("at", "why"),
+        [
+            ({"a_joint3": 1.7, "a_joint4": 1.7, "a_joint5": 0.5}, "links overlap"),
+            ({"a_joint2": -1.6, "a_joint3": -1.6}, "the TCP is behind the limb in it"),
+        ],
+    )
+    def test_a_known_posture_that_is_no_good_is_not_the_one_to_start_in(self, tmp_path, at, why):
+        parts, _ = single_arm()
+        joints = {f"a_joint{i}": at.get(f"a_joint{i}", 0.0) for i in range(1, 7)}
+        hints = Hints(source="the file", postures={"home": joints})
+        found = guess_robot(LocalUrdf(str(parts.write(tmp_path))), None, {}, hints=hints)
+        robot = found.descriptor
+        assert robot.keyframe("home") == tuple(joints.values())
+        assert robot.keyframe("rest") != robot.keyframe("home")
+        assert rest_overlaps(robot) == 0
+        said = f"keyframe 'rest' is not the posture 'home' of the file: {why}"
+        assert any(reason.startswith(said) for reason in found.reasons)
+
+    def test_a_known_posture_is_kept_but_off_its_stops(self, tmp_path):
+        parts, _ = single_arm()
+        joints = {f"a_joint{i}": 0.0 for i in range(1, 7)} | {"a_joint6": 1.8}
+        hints = Hints(source="the file", postures={"home": joints})
+        found = guess_robot(LocalUrdf(str(parts.write(tmp_path))), None, {}, hints=hints)
+        assert found.descriptor.keyframe("rest") == pytest.approx([0, 0, 0, 0, 0, 1.62])
+        assert any("off it" in r for r in found.reasons if r.startswith("keyframe 'rest'"))
+
+    def test_slides_take_no_joint_noise_and_telescopes_may_overlap(self, tmp_path):
+        parts = Parts()
+        parent = parts.link("base", 5.0, "0.3 0.3 0.1")
+        for i in range(1, 4):  # each starts inside the one before
+            child = parts.link(f"tube{i}", size=f"{0.4 - 0.02 * i} 0.05 0.05", at="0.2 0 0")
+            at = "0 0 0.3" if i == 1 else "0.02 0 0"
+            parts.joint(f"out{i}", parent, child, at, axis="1 0 0", limits=(0.0, 0.3),
+                        kind="prismatic")  # fmt: skip
+            parent = child
+        parts.arm(parent, "a", "0.4 0 0.1")
+        robot = guess(parts, tmp_path).descriptor
+        groups = robot.action_split.groups
+        assert groups["arm_slide"].joints == ("out1", "out2", "out3")
+        assert not groups["arm_slide"].reset_noise
+        assert groups["arm"].reset_noise
+        assert ("tube1", "tube3") in robot.allowed_collisions
+
+    @pytest.mark.parametrize("turns_first", [True, False])
+    def test_a_base_that_turns_and_slides_far_is_no_part_of_the_arm(self, tmp_path, turns_first):
+        parts = Parts()
+        parts.link("ground", 1.0)
+        parts.link("platform", 5.0, "0.3 0.3 0.1")
+        far: dict[str, Any] = {"limits": (-1e3, 1e3), "kind": "prismatic"}
+        if turns_first:
+            parts.link("turned")
+            parts.joint("wheel_yaw", "ground", "turned", "0 0 0")
+            parts.joint("way", "turned", "platform", "0 0 0", axis="1 0 0", **far)
+            base = {"wheel_yaw", "way"}
+        else:
+            parts.link("along_x")
+            parts.link("along_y")
+            parts.joint("x", "ground", "along_x", "0 0 0", axis="1 0 0", **far)
+            parts.joint("y", "along_x", "along_y", "0 0 0", axis="0 1 0", **far)
+            parts.joint("th", "along_y", "platform", "0 0 0")
+            base = {"x", "y", "th"}
+        parts.arm("platform", "a", "0 0 0.1")
+        groups = joints_of(guess(parts, tmp_path))
+        assert groups["arm"] == {f"a_joint{i}" for i in range(1, 7)}
+        assert groups.get("base", set()) | groups["base_slide"] == base
 
     def test_joints_stay_away_from_their_limits(self, tmp_path):
         parts, _ = single_arm()
