@@ -81,7 +81,8 @@ class FromUrdf(Protocol):
             quiet: Whether to say nothing.
             xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
             srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
-            **overrides: Fields that are known better than guessed.
+            **overrides: Fields that are known better than guessed. ``limbs={"left": "1"}`` calls
+                the guessed limb 1 so; limbs that are left out are held still.
         """
         ...
 

@@ -56,6 +56,7 @@ def guess_descriptor(
             states and disabled pairs are taken over. None takes disabled pairs of one beside the
             URDF that is called as it, and nothing else.
         **overrides: Fields of `robots.RobotDescriptor` that are known better than guessed.
+            ``limbs={"left": "1"}`` calls the guessed limb 1 so; limbs that are left out are held.
 
     Returns:
         The guess: ``.descriptor``, ``.reasons``, and ``.module()``, the data module to paste.
@@ -102,8 +103,9 @@ def print_guess(
     module: bool = False,
     xacro: Annotated[Sequence[tuple[str, str]], Word("KEY=VALUE", _argument, action="append")] = (),
     srdf: Annotated[str, Word("FILE")] | None = None,
+    all: bool = False,
 ) -> None:
-    """Guess a robot's descriptor from its URDF or MJCF, and say why.
+    """Guess a robot's descriptor from its URDF or MJCF, and say what weakens it.
 
     Args:
         urdf: A URDF or an MJCF (.xml) on this machine, or a name of the package
@@ -112,12 +114,13 @@ def print_guess(
         module: Print the data module to paste.
         xacro: Argument of a xacro template; may be given again.
         srdf: SRDF with the robot's groups, states and disabled pairs.
+        all: Say all that was guessed, and why.
 
     Raises:
         RobotLayoutsError: If the file is unusable, or there is no robot of that name.
     """
     found = guess_descriptor(urdf, name, xacro=dict(xacro), srdf=srdf)
-    print(found.module().rstrip("\n") if module else found)
+    print(found.module().rstrip("\n") if module else found if all else found.summary())
 
 
 def _find(path_or_name: str | os.PathLike[str], form: str | None) -> Path:

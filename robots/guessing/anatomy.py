@@ -16,6 +16,7 @@ import numpy as np
 
 from robot_layouts.core.errors import DescriptorError
 from robots.guessing import words
+from robots.guessing.doubt import Doubt
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.tree import rest_poses
 
@@ -296,12 +297,13 @@ def _instead(search: _Search) -> list[_Chain]:
         if found:
             for chain in found:
                 chain.kind = "arm"
-            search.reasons.append(f"arm: none is recognised, so the {kind} are driven as arms")
+            instead = f"arm: none is recognised, so the {kind} are driven as arms"
+            search.reasons.append(Doubt(instead))
             return found
     torso = tuple(search.torso) or search.base
     search.torso, search.base = [], ()
     search.reasons.append(
-        f"arm: {_listing(torso)}; they move the whole robot, which so flies freely"
+        Doubt(f"arm: {_listing(torso)}; they move the whole robot, which so flies freely")
     )
     return [_Chain(torso, palm=torso[-1].child, kind="arm")]
 
@@ -340,6 +342,13 @@ def _named(search: _Search, arms: Sequence[_Chain]) -> list[Limb]:
             sides = ["left" if y == max(across) else "right" for y in across]
         else:
             sides = [str(i + 1) for i in range(len(arms))]
+            search.reasons.append(
+                Doubt(
+                    f"limbs: {', '.join(sides)}, as nothing says what they are called;"
+                    f" limbs={{NAME: {sides[0]!r}, NAME: {sides[1]!r}}} names them, and holds the"
+                    " others still"
+                )
+            )
     return [
         Limb(side, chain.joints, chain.fingers, chain.palm)
         for side, chain in zip(sides, arms, strict=True)

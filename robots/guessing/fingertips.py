@@ -10,6 +10,7 @@ from robot_layouts.kinematics.rotations import Floats, inverse_pose, transform
 from robots.bodies.hulls import Hull
 from robots.guessing import words
 from robots.guessing.anatomy import Limb
+from robots.guessing.doubt import Doubt
 from robots.guessing.stance import Stance
 from robots.parts import Fingers, GripperMaterial, Vector3
 from robots.urdf.model import ModelJoint, UrdfModel
@@ -22,7 +23,8 @@ CAP = 0.15  # of a finger's length; its corners within it from the end make its 
 ALONG = 0.7  # cosine; how well a finger's y axis must lie along the way in which it opens
 EXACTLY = 0.95  # the same of its other axes
 STILL = 1e-3  # m; fingers whose tips part less do not open
-OPPOSITE = ("index", "middle")  # fingers that a thumb meets, the first one first
+THUMB = ("thumb", "th")
+OPPOSITE = (("index", "ff"), ("middle", "mf"))  # fingers that a thumb meets, the first one first
 WIDE = 110.0  # degrees; of a finger that swings, as ManiSkill's SO-100 has it
 
 
@@ -118,7 +120,7 @@ class Fingertips:
         others = [end for end in self.ends if end not in thumbs]
         if not thumbs or not others:
             return (self.ends[0], self.ends[1]) if len(self.ends) == 2 else None
-        named = [[end for end in others if self.is_called(end, word)] for word in OPPOSITE]
+        named = [[end for end in others if self.is_called(end, known)] for known in OPPOSITE]
         return thumbs[0], next((ends[0] for ends in named if ends), others[0])
 
     def opening(self, ends: Sequence[str], postures: Sequence[Mapping[str, float]]) -> Floats:
@@ -144,13 +146,13 @@ class Fingertips:
 
     def is_thumb(self, link: str) -> bool:
         """Tell whether a link belongs to a finger that is called a thumb."""
-        return self.is_called(link, "thumb")
+        return self.is_called(link, THUMB)
 
-    def is_called(self, link: str, word: str) -> bool:
-        """Tell whether a link belongs to a finger that is called by a word."""
+    def is_called(self, link: str, known: tuple[str, ...]) -> bool:
+        """Tell whether a link belongs to a finger that is called by one of some words."""
         path = self.stance.model.path_to(link)
         names = [joint.name for joint in path if joint in self.limb.fingers]
-        return any(words.has(name, (word,)) for name in (link, *names))
+        return any(words.has(name, known) for name in (link, *names))
 
     def tip(self, end: str) -> Floats:
         """Return the tip of one of ``ends``, in the root's frame, (3,) (m)."""
@@ -202,10 +204,10 @@ def find_fingers(
         tips: The tips of its fingers, if it has any.
         postures: Where its joints are, open first, then less and less (rad, m).
     """
-    ends = tips.grasping() if tips else None
+    ends, which = tips.grasping() if tips else None, f"{limb.name} fingers".lstrip()
     if tips is None or ends is None:
-        return None, (
-            f"fingers: none, as {'no two tips' if limb.fingers else 'no fingers'} are found, so"
+        return None, Doubt(
+            f"{which}: none, as {'no two tips' if limb.fingers else 'no fingers'} are found, so"
             " grasps go unnoticed; fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS)) with"
             " the links that touch, and which way each opens in its own frame, changes that"
         )
@@ -217,7 +219,7 @@ def find_fingers(
     )
     along = " and ".join(dict.fromkeys(map(_axis_name, axes)))
     moves = "swing" if swings else "slide"
-    return fingers, f"fingers: {one} and {other} {moves} open along their {along}, as the tips part"
+    return fingers, f"{which}: {one} and {other} {moves} open along their {along}, as the tips part"
 
 
 def _signed_axis(way: Floats) -> tuple[int, Vector3]:

@@ -12,6 +12,7 @@ from robot_layouts.kinematics.rotations import Floats
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
 from robots.guessing.anatomy import Limb, flies
+from robots.guessing.doubt import Doubt
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
 from robots.urdf.model import ModelJoint
@@ -167,7 +168,8 @@ class PostureSearch:
         found = self.run()
         if self._left(found.position) > self._left(posture):
             return self._made(posture, about)
-        return replace(found, reasons=(*found.reasons, f"keyframe 'rest' is not {where}: {why}"))
+        instead = Doubt(f"keyframe 'rest' is not {where}: {why}")
+        return replace(found, reasons=(*found.reasons, instead))
 
     def _objection(self, posture: Floats) -> str:
         """Return why one should not start in a posture, or nothing."""
@@ -220,7 +222,8 @@ class PostureSearch:
         reasons = [f"keyframe 'rest': {about}"]
         if pairs:
             listing = ", ".join(f"{one} and {other}" for one, other in pairs)
-            reasons.append(f"allowed_collisions, too: {listing}, which overlap in that posture")
+            overlaps = f"allowed_collisions, too: {listing}, which overlap in that posture"
+            reasons.append(Doubt(overlaps))
         return Posture(position, pairs, tuple(reasons))
 
     def _off_stops(self, position: Floats) -> Floats:

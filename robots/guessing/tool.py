@@ -13,6 +13,7 @@ from robot_layouts.kinematics.solve import farthest
 from robot_layouts.kinematics.tree import Tree
 from robots.guessing import words
 from robots.guessing.anatomy import Limb, flies
+from robots.guessing.doubt import Doubt
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.stance import Stance
 from robots.parts import Vector3
@@ -106,14 +107,17 @@ def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
             return Tool(named[0], (), reason)
     if not rigid:
         return Tool(
-            limb.palm, (), f"{which}: the link {limb.palm}, the last one, as no tool is named"
+            limb.palm,
+            (),
+            Doubt(f"{which}: the link {limb.palm}, the last one, as no tool is named"),
         )
     seen = {*stance.model.collisions, *stance.model.visuals}
     solid = [link for link in rigid if link in seen] or rigid
     places = stance.places((limb.palm, *solid))
     far = np.linalg.norm(places[1:] - places[0], axis=1)
     last = solid[int(np.argmax(np.round(far, 6)))]
-    return Tool(last, (), f"{which}: the link {last}, the farthest one, as no tool is named")
+    reason = f"{which}: the link {last}, the farthest one, as no tool is named"
+    return Tool(last, (), Doubt(reason))
 
 
 def _between(
@@ -147,7 +151,7 @@ def _between(
         return _mean(stance, limb, best, which, distance, middle)
     only = ", which is only the palm" if best == (limb.palm,) else ", the nearest to the tips"
     apart = _apart(distance, _seen_from(stance, best[0], middle))
-    return Tool(best[0], (), f"{which}: the link {best[0]}{only}{apart}")
+    return Tool(best[0], (), Doubt(f"{which}: the link {best[0]}{only}{apart}"))
 
 
 def _named(stance: Stance, tips: Fingertips, which: str, link: str, distance: float) -> Tool:
@@ -168,7 +172,8 @@ def _mean(
 ) -> Tool:
     listing = ", ".join(links[:-1]) + f" and {links[-1]}"
     reason = f"{which}: the middle of {listing}, turned as {limb.palm}"
-    return Tool(limb.palm, links, reason + _apart(distance, _seen_from(stance, limb.palm, middle)))
+    apart = _apart(distance, _seen_from(stance, limb.palm, middle))
+    return Tool(limb.palm, links, Doubt(reason + apart) if apart else reason)
 
 
 def _beside(stance: Stance, limb: Limb, which: str, distance: float, middle: Floats) -> Tool:
@@ -259,7 +264,9 @@ def find_reach(
     limits[free] = np.array([joint.span for joint in moving]).reshape(-1, 2)
     found = farthest(replace(tree, limits=limits), palm, point, starts, free)
     if found < 0.01 or len(moving) < len(limb.arm):
-        return 1.0, "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"
+        return 1.0, Doubt(
+            "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"
+        )
     return round(found, 3), (
         "reach: the TCP's largest distance from the base's z axis within the joint limits;"
         " data sheets, which measure to the flange, give less"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robots import LocalUrdf, RobotDescriptor
+from robots import LocalUrdf, RobotDescriptor, RobotLayoutsError
 from robots.bodies.hulls import load_model
 from robots.bodies.overlaps import overlapping
 from robots.from_urdf import Guess, guess_descriptor
@@ -95,6 +95,37 @@ class TestLimbs:
         assert [name for name in joints_of(guess(parts, tmp_path)) if "arm" in name] == [
             "arm_1", "arm_2", "arm_3",
         ]  # fmt: skip
+
+    @pytest.mark.parametrize("off", [False, True])
+    def test_limbs_are_renamed_or_turned_off(self, tmp_path, off):
+        parts = torso()
+        for i, y in enumerate((-0.3, 0.0, 0.3), start=1):
+            parts.arm("lifted", f"x{i}", f"0.1 {y} 0.1")
+        file = parts.write(tmp_path)
+        limbs = {"low": "1"} if off else {"low": "1", "high": "3"}
+        found = guess_descriptor(file, limbs=limbs)
+        groups = joints_of(found)
+        assert set(found.descriptor.limbs) == (set() if off else {"low", "high"})
+        assert groups["arm" if off else "low_arm"] == {f"x1_joint{i}" for i in range(1, 7)}
+        assert {f"x2_joint{i}" for i in range(1, 7)} <= groups["body"]
+        assert found.descriptor.action_dim == (6 if off else 12)
+        assert any(r.startswith("held still: x2_joint1, ") for r in found.reasons)
+        assert any("limbs={NAME: '1', NAME: '2'}" in r for r in guess_descriptor(file).doubts)
+
+    @pytest.mark.parametrize(
+        ("limbs", "message"),
+        [
+            ({"left": "4"}, "unknown limb '4'"),
+            ({"left_arm": "1"}, "'left_arm' names no limb; it takes letters and digits"),
+            ({"a": "1", "b": "1"}, "names a limb twice"),
+        ],
+    )
+    def test_limbs_that_there_are_not_are_refused(self, tmp_path, limbs, message):
+        parts = torso()
+        for i, y in enumerate((-0.3, 0.0, 0.3), start=1):
+            parts.arm("lifted", f"x{i}", f"0.1 {y} 0.1")
+        with pytest.raises(RobotLayoutsError, match=message):
+            guess_descriptor(parts.write(tmp_path), limbs=limbs)
 
     def test_head_wheels_and_legs_are_held_and_the_reason_says_how_to_drive_them(self, tmp_path):
         parts = torso()
