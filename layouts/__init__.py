@@ -10,6 +10,7 @@ from layouts.maniskill import from_maniskill
 from layouts.placement import Placement
 from layouts.placing import search
 from layouts.presets import around_table, face_to_face, grid, ring, side_by_side, single
+from layouts.standing import at_task
 from robot_layouts.kinematics.quaternions import rpy_quaternion, yaw_quaternion
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "Placement",
     "Pose",
     "around_table",
+    "at_task",
     "ceiling",
     "face_to_face",
     "from_maniskill",

@@ -83,7 +83,8 @@ class FromUrdf(Protocol):
             xacro: Arguments of a xacro template, as in ``{"prefix": "left_"}``.
             srdf: An SRDF: its groups, states, TCPs and disabled pairs are taken over.
             folder: A folder whose files may be read, too.
-            **overrides: Fields that are known better than guessed.
+            **overrides: Fields that are known better than guessed. ``limbs={"left": "1"}`` calls
+                the guessed limb 1 so; limbs that are left out are held still.
         """
         ...
 

@@ -59,6 +59,7 @@ def guess_descriptor(
         folder: A folder whose files may be read, too, such as that of a package which lies
             neither around nor beside the file.
         **overrides: Fields of `robots.RobotDescriptor` that are known better than guessed.
+            ``limbs={"left": "1"}`` calls the guessed limb 1 so; limbs that are left out are held.
 
     Returns:
         The guess: ``.descriptor``, ``.reasons``, and ``.module()``, the data module to paste.
@@ -108,8 +109,9 @@ def print_guess(
     xacro: Annotated[Sequence[tuple[str, str]], Word("KEY=VALUE", _argument, action="append")] = (),
     srdf: Annotated[str, Word("FILE")] | None = None,
     folder: Folder | None = None,
+    all: bool = False,
 ) -> None:
-    """Guess a robot's descriptor from its URDF or MJCF, and say why.
+    """Guess a robot's descriptor from its URDF or MJCF, and say what weakens it.
 
     Args:
         urdf: A URDF or an MJCF (.xml) on this machine, or a name of the package
@@ -119,12 +121,13 @@ def print_guess(
         xacro: Argument of a xacro template; may be given again.
         srdf: SRDF with the robot's groups, states and disabled pairs.
         folder: Folder whose files may be read, too, such as that of a package elsewhere.
+        all: Say all that was guessed, and why.
 
     Raises:
         RobotLayoutsError: If the file is unusable, or there is no robot of that name.
     """
     found = guess_descriptor(urdf, name, xacro=dict(xacro), srdf=srdf, folder=folder)
-    print(found.module().rstrip("\n") if module else found)
+    print(found.module().rstrip("\n") if module else found if all else found.summary())
 
 
 def _find(path_or_name: str | os.PathLike[str], form: str | None) -> Path:

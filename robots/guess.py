@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from dataclasses import fields as fields_of
 from importlib.util import find_spec
@@ -20,11 +20,12 @@ from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.descriptor import RobotDescriptor, UrdfSource
 from robots.guessing import words
 from robots.guessing.anatomy import Anatomy, Limb, find_anatomy
+from robots.guessing.doubt import Doubt
 from robots.guessing.drives import Drives, read_masses
 from robots.guessing.fingertips import Fingertips, find_fingers, find_material
 from robots.guessing.grippers import Gripper, entangled, find_gripper
 from robots.guessing.groups import arm_groups, held_groups
-from robots.guessing.hints import NOTHING, Hints, known_anatomy, known_tip
+from robots.guessing.hints import NOTHING, Hints, known_anatomy, known_tip, renamed
 from robots.guessing.posture import Posture, PostureSearch
 from robots.guessing.stance import Stance
 from robots.guessing.tool import BETWEEN, EXACT, Tool, find_base, find_reach, find_tool
@@ -60,9 +61,23 @@ class Guess:
     reasons: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Return name and reasons, one a line."""
+        """Return name and reasons, one a line; what weakens use comes first."""
+        others = [reason for reason in self.reasons if reason not in self.doubts]
+        return self._listed([*self.doubts, *others])
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """The reasons that weaken what the robot can do, or were decided on little."""
+        return tuple(reason for reason in self.reasons if isinstance(reason, Doubt))
+
+    def summary(self) -> str:
+        """Return name and doubts, one a line, and how many reasons there are besides."""
+        rest = len(self.reasons) - len(self.doubts)
+        return self._listed([*self.doubts, f"{rest} more reasons: --all"])
+
+    def _listed(self, reasons: Sequence[str]) -> str:
         head = f"{self.descriptor.name}: {self.descriptor.summary}, all guessed"
-        return "\n".join([head, *(f"  {reason}" for reason in self.reasons)])
+        return "\n".join([head, *(f"  {reason}" for reason in reasons)])
 
     def module(self) -> str:
         """Return the data module that declares the descriptor, to paste and correct."""
@@ -99,7 +114,9 @@ def guess(
     Args:
         source: Where its URDF comes from.
         name: Registry name; None takes that of the URDF.
-        overrides: Fields of the descriptor that are known better.
+        overrides: Fields of the descriptor that are known better. In ``limbs``, names of limbs as
+            they are guessed may stand for these: ``{"left": "1", "right": "2"}`` renames two, and
+            a limb that is left out is held still.
         file: The file that the robot is described in; None if it is the URDF.
         hints: What else is known of it.
 
@@ -112,14 +129,19 @@ def guess(
         raise DescriptorError(f"a descriptor has no fields {unknown}; it has {', '.join(names)}")
     path = source.locate()
     cleaned = read_cleaned(path)
-    parts = _look_at(path, cleaned.xml, hints, overrides)
+    limbs = overrides.get("limbs")
+    if limbs and all(isinstance(limb, str) for limb in limbs.values()):
+        overrides = {field: value for field, value in overrides.items() if field != "limbs"}
+        parts = _look_at(path, cleaned.xml, hints, overrides, limbs)
+    else:
+        parts = _look_at(path, cleaned.xml, hints, overrides)
     main = parts.anatomy.limbs[0]
     tool = parts.tools[main.name]
     split = _action_split(parts)
     allowed, overlaps = _may_overlap(parts, path)
     rest, posture = _rest(parts, allowed)
     distance, measured = find_reach(parts.model, main, tool, rest)
-    fingers, grasping = _fingers(parts, main)
+    fingers, _ = _fingers(parts, main)
     wheels = _wheels(parts)
     fields: dict[str, Any] = {
         "name": name or _as_name(parts.model.name or path.stem),
@@ -144,7 +166,7 @@ def guess(
         *(() if hints.limbs else hints.reasons),
         *parts.anatomy.reasons,
         *(tool.reason for tool in parts.tools.values()),
-        *((*_about_hands(parts), grasping) if parts.grippers else ()),
+        *_about_hands(parts),
         *parts.drives.reasons(),
         *_out_of_limits(parts),
         *((rolling,) if wheels else ()),
@@ -156,9 +178,17 @@ def guess(
     return Guess(RobotDescriptor(**{**fields, **overrides}), reasons)
 
 
-def _look_at(path: Path, xml: bytes, hints: Hints, overrides: Mapping[str, Any]) -> _Parts:
+def _look_at(
+    path: Path,
+    xml: bytes,
+    hints: Hints,
+    overrides: Mapping[str, Any],
+    names: Mapping[str, str] | None = None,
+) -> _Parts:
     model = read_model(xml, path.as_posix())
     anatomy = known_anatomy(model, find_anatomy(model, path.as_posix()), hints)
+    if names:
+        anatomy = renamed(model, anatomy, names)
     stance = Stance(model)
     hulls = read_hulls(model, path) if find_spec("fcl") else ()
     bodies: dict[int, list[Floats]] = {}
@@ -231,8 +261,8 @@ def _wheels(parts: _Parts) -> tuple[str, ...]:
 
 
 def _fingers(parts: _Parts, limb: Limb) -> tuple[Fingers | None, str]:
-    opened = parts.grippers[limb.name].postures[0] if limb.fingers else {}
-    return find_fingers(limb, parts.tips.get(limb.name), opened)
+    postures = parts.grippers[limb.name].postures if limb.fingers else ()
+    return find_fingers(limb, parts.tips.get(limb.name), postures)
 
 
 def _limbs(parts: _Parts, rest: Mapping[str, float]) -> dict[str, LimbDescription]:
@@ -258,6 +288,7 @@ def _about_hands(parts: _Parts) -> Iterator[str]:
     if material is not None:
         links = ", ".join(material.links)
         yield f"gripper_material: friction 2 on {links}, as ManiSkill's grippers have"
+    yield from (_fingers(parts, limb)[1] for limb in parts.anatomy.limbs if limb.fingers)
 
 
 def _may_overlap(parts: _Parts, path: Path) -> tuple[LinkPairs, tuple[str, ...]]:
@@ -370,7 +401,7 @@ def _out_of_limits(parts: _Parts) -> Iterator[str]:
     for name, joints in parts.hints.postures.items():
         outside = [joint for joint, at in joints.items() if _outside(parts, joint, at)]
         if outside:
-            yield (
+            yield Doubt(
                 f"the posture {name!r} of {parts.hints.source} is left out, as it is beyond the"
                 f" limits of {', '.join(outside)}"
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import combinations, groupby
 
 from robot_layouts.core.bounds import expect_unit
@@ -17,6 +17,7 @@ Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # wxyz
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
+OWN_Y: Vector3 = (0.0, 1.0, 0.0)
 
 _Owners = dict[str, str | None]
 
@@ -65,15 +66,18 @@ class Fingers:
 
     Attributes:
         links: The two finger links.
-        opening_signs: For each finger, the sign of its own y axis that points to opening.
+        opening_signs: For each finger, the sign of its opening axis that points to opening.
         min_force: Smallest contact force of each finger (N).
         max_angle: Largest angle between force and opening direction (degrees).
+        opening_axes: For each finger, the axis along which it opens, of any length, in the frame of
+            its link; its own y axis unless it is given.
     """
 
     links: tuple[str, str]
     opening_signs: tuple[int, int] = (1, -1)
     min_force: float = 0.5
     max_angle: float = 85.0
+    opening_axes: tuple[Vector3, Vector3] = (OWN_Y, OWN_Y)
 
     def __post_init__(self) -> None:
         """Refuse links that are not two, and numbers that tell no grasp."""
@@ -91,6 +95,17 @@ class Fingers:
             0 <= self.max_angle <= 180,
             f"Fingers: max_angle is {self.max_angle} degrees; it must be between 0 and 180",
         )
+        expect(
+            all(map(any, self.opening_axes)),
+            f"Fingers: opening_axes is {self.opening_axes}; each must have a length, such as"
+            f" {OWN_Y}",
+        )
+
+    def __repr__(self) -> str:
+        """Show the fields, but not axes that are both y: digests of older descriptors stay."""
+        shown = [f"{field.name}={getattr(self, field.name)!r}" for field in fields(self)]
+        along_y = self.opening_axes == (OWN_Y, OWN_Y)
+        return f"Fingers({', '.join(shown[:-1] if along_y else shown)})"
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from importlib import import_module
 from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from layouts import Layout, Placement
+from layouts import Layout, Placement, at_task
 from layouts.placement import RobotLike, load_robot
 from robot_layouts.core.bounds import shown
 from robot_layouts.core.catalogue import Catalogue, reason
@@ -214,7 +214,8 @@ def make(
         num_envs: Number of environments in this process.
         robots: Other robots for some places: a mapping place → robot, or one robot for a task
             with one place; by name, descriptor, the path of a URDF or MJCF to guess it from, or
-            ``MODULE:NAME``. One that lacks its place's keyframe starts from its home's.
+            ``MODULE:NAME``. One that lacks its place's keyframe starts from its home's. One robot
+            of several limbs serves all places, and stands as `layouts.at_task` puts it.
         layout: Another layout with the task's places, in any order; for a task over any number of
             robots, with places of any names. ``bystanders="hold"`` or ``"act"`` lets more robots
             stand there.
@@ -299,8 +300,11 @@ def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike])
     if isinstance(robots, Mapping):
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         return Layout({**layout, **changed}, layout.frames)
-    if len(layout) == 1 and isinstance(robots, (str, PathLike, RobotDescriptor)):
-        return _replace_robots(layout, {next(iter(layout)): robots})
+    if isinstance(robots, (str, PathLike, RobotDescriptor)):
+        if len(layout) == 1:
+            return _replace_robots(layout, {next(iter(layout)): robots})
+        if (robot := load_robot(robots)).limbs:
+            return at_task(robot, layout)
     given = [robots] if isinstance(robots, (str, RobotDescriptor)) else robots
     names = [name for name in given if isinstance(name, str)] if isinstance(given, list) else []
     example = dict(zip(layout, names or ["panda"], strict=False))

@@ -22,6 +22,7 @@ MOST = {
     "step": 130,
     "plan": 13_000,
     "search": 150_000,
+    "from_urdf": 12_000,
 }
 
 
@@ -46,7 +47,9 @@ def calls_of_verbs() -> dict[str, int]:
     import layouts
     import tasks
     from robot_layouts import motion
+    from robots import RobotDescriptor
     from tests.motion.two_pandas import aside, cell, turned
+    from tests.robots.test_from_urdf import urdf_of
 
     counts: dict[str, int] = {}
     counts["make, first"], env = calls_of(lambda: tasks.make("TwoRobotPickCube-v1"))
@@ -58,6 +61,9 @@ def calls_of_verbs() -> dict[str, int]:
     counts["plan"], _ = calls_of(lambda: motion.plan(cell(), aside(), goals))
     robots = {"left": "panda", "right": "panda"}
     counts["search"], _ = calls_of(lambda: layouts.search(robots, {"cube": (0.4, 0.0, 0.2)}))
+    counts["from_urdf"], _ = calls_of(
+        lambda: RobotDescriptor.from_urdf(urdf_of("panda"), quiet=True)
+    )
     return counts
 
 

@@ -50,7 +50,8 @@ def need_fingers(task: TaskEnv, plan: str, *robots: str) -> None:
         if robot.fingers is None:
             raise TaskError(
                 f"{plan} needs fingers on {' and '.join(map(repr, robots))}; {name!r} is a"
-                f" {robot.name}, which has none"
+                f" {robot.name}, which has none (if two links of it grasp, its field"
+                " fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS)) says so)"
             )
 
 

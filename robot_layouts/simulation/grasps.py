@@ -33,9 +33,10 @@ def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
 
 def _strong_and_straight(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
     count = len(poses)
-    signs = np.repeat(np.array(fingers.opening_signs, np.float32), forces.shape[1])
+    signed = np.array(fingers.opening_axes) * np.array(fingers.opening_signs)[:, None]
+    axes = np.repeat(signed.astype(np.float32), forces.shape[1], axis=0)
     turned = rotation_matrix(np.concatenate(poses)[:, 3:])  # one finger's worlds after the other's
-    opening = torch.from_numpy(signs[:, None] * turned[:, :, 1])
+    opening = torch.from_numpy((turned * axes[:, None]).sum(axis=2))
     force = torch.from_numpy(forces.reshape(-1, 3))
     strong = torch.linalg.vector_norm(force, dim=1) >= fingers.min_force
     angle = torch.rad2deg(_angle_between(opening, force))

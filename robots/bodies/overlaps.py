@@ -19,6 +19,7 @@ from robots.urdf.tree import kinematic_tree, rest_poses
 
 POSTURES = 200  # random ones, in which overlaps are looked for
 ALWAYS = 0.95  # of them; what MoveIt's setup assistant takes for always
+PARALLEL = 0.999  # cosine; of slides that are one telescope
 MARGIN = 0.05  # m; more than the distance from which PhysX looks at a pair
 
 
@@ -41,6 +42,9 @@ def guess_allowed(
     source = "the SRDF's disabled pairs"
     if not pairs:
         pairs, source = neighbours(model), "neighbours across fixed joints"
+        if telescopes := sliding_inside(model):
+            pairs |= telescopes
+            source += ", links that slide inside each other as a telescope's"
     reasons = [f"allowed_collisions: {source}, and links that overlap wherever the joints stand"]
     fixed = joined_pairs(model) | rigid_pairs(model)
     if find_spec("fcl") is None:
@@ -62,6 +66,24 @@ def neighbours(model: UrdfModel) -> frozenset[LinkPair]:
         for joint in model.moving
         for pair in product(group[joint.parent], group[joint.child])
     )
+
+
+def sliding_inside(model: UrdfModel) -> frozenset[LinkPair]:
+    """Return the pairs of links of telescopes: two or more joints in a row slide along one way."""
+    rest, groups = rest_poses(model), rigid_groups(model)
+    group = {link: links for links in groups.values() for link in links}
+    pairs: set[LinkPair] = set()
+    for last in model.moving:
+        row: list[ModelJoint] = []
+        way = rest[last.child][:3, :3] @ last.axis
+        for joint in reversed([j for j in model.path_to(last.child) if j.moves]):
+            along = abs(float(way @ rest[joint.child][:3, :3] @ joint.axis)) > PARALLEL
+            if joint.type != "prismatic" or not along:
+                break
+            row.append(joint)
+        carriers = {link for joint in row[1:] for link in group[joint.parent]}
+        pairs |= {frozenset(pair) for pair in product(carriers, group[last.child])}
+    return frozenset(pairs)
 
 
 def always_overlapping(

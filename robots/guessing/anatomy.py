@@ -16,6 +16,7 @@ import numpy as np
 
 from robot_layouts.core.errors import DescriptorError
 from robots.guessing import words
+from robots.guessing.doubt import Doubt
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.tree import rest_poses
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 
 FARTHEST_SLIDE = 4.0  # m; a slide that goes farther is a way for a whole robot
+IN_PLACE = 1e-3  # m; a joint that is so near to where its parent link is turns there
 LONGEST_HAND = 0.4  # of the length of the arm that carries it
 LARGEST_HAND = 0.35  # m, of a hand without arm whose names do not say so
 FEWEST_ARM_JOINTS = 4  # of an arm whose names do not say so, beside other limbs
@@ -153,7 +155,7 @@ def _walk(search: _Search, link: str, path: Joints) -> None:
     nexts = search.model.moving_on(link)
     if not nexts:
         search.chains.append(_Chain(path, palm=path[-1].child))
-    elif len(nexts) == 1 and not path and _moves_the_whole(nexts[0]):
+    elif len(nexts) == 1 and not path and _is_of_base(search, nexts[0]):
         search.base += nexts
         if search.model.moving_on(nexts[0].child):
             _walk(search, nexts[0].child, ())
@@ -189,6 +191,25 @@ def _is_accessory(search: _Search, joint: ModelJoint, path: Joints) -> bool:
     follows = all(other.mimics for other in behind)
     is_arm = any(words.has(name, words.ARM) for name in names)
     return follows or (len(path) > 1 and len(behind) < 3 and not is_arm)
+
+
+def _is_of_base(search: _Search, joint: ModelJoint) -> bool:
+    """Tell whether a joint at the root moves the whole robot, by itself or with the next ones.
+
+    One that turns does, too, if a slide of a base follows it, or if it turns in the place to which
+    slides of a base have brought it.
+    """
+    model = search.model
+    if _moves_the_whole(joint):
+        return True
+    if joint.unit != "rad":
+        return False
+    after = model.moving_on(joint.child)
+    if len(after) == 1 and flies(after[0]):
+        return True
+    slides = [before for before in search.base if flies(before)]
+    turns_there = float(np.linalg.norm(joint.origin[:3, 3])) < IN_PLACE
+    return len(slides) > 1 and slides[-1] is search.base[-1] and turns_there
 
 
 def _moves_the_whole(joint: ModelJoint) -> bool:
@@ -276,12 +297,13 @@ def _instead(search: _Search) -> list[_Chain]:
         if found:
             for chain in found:
                 chain.kind = "arm"
-            search.reasons.append(f"arm: none is recognised, so the {kind} are driven as arms")
+            instead = f"arm: none is recognised, so the {kind} are driven as arms"
+            search.reasons.append(Doubt(instead))
             return found
     torso = tuple(search.torso) or search.base
     search.torso, search.base = [], ()
     search.reasons.append(
-        f"arm: {_listing(torso)}; they move the whole robot, which so flies freely"
+        Doubt(f"arm: {_listing(torso)}; they move the whole robot, which so flies freely")
     )
     return [_Chain(torso, palm=torso[-1].child, kind="arm")]
 
@@ -320,6 +342,13 @@ def _named(search: _Search, arms: Sequence[_Chain]) -> list[Limb]:
             sides = ["left" if y == max(across) else "right" for y in across]
         else:
             sides = [str(i + 1) for i in range(len(arms))]
+            search.reasons.append(
+                Doubt(
+                    f"limbs: {', '.join(sides)}, as nothing says what they are called;"
+                    f" limbs={{NAME: {sides[0]!r}, NAME: {sides[1]!r}}} names them, and holds the"
+                    " others still"
+                )
+            )
     return [
         Limb(side, chain.joints, chain.fingers, chain.palm)
         for side, chain in zip(sides, arms, strict=True)

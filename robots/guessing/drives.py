@@ -10,6 +10,7 @@ import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.kinematics.tree import Tree
+from robots.guessing.doubt import Doubt
 from robots.guessing.hints import DriveHint
 from robots.guessing.stance import Stance
 from robots.urdf.model import ModelJoint, UrdfModel
@@ -107,8 +108,10 @@ class Drives:
         ]
         if self._raised:
             reasons.append(
-                f"forces: more than the URDF's efforts for {', '.join(self._raised)}, which would"
-                f" not bring them {SHORTEST_STEP:g} rad or m in a control step"
+                Doubt(
+                    f"forces: more than the URDF's efforts for {', '.join(self._raised)}, which"
+                    f" would not bring them {SHORTEST_STEP:g} rad or m in a control step"
+                )
             )
         return reasons
 

@@ -10,8 +10,9 @@ from robot_layouts.kinematics.rotations import Floats, inverse_pose, transform
 from robots.bodies.hulls import Hull
 from robots.guessing import words
 from robots.guessing.anatomy import Limb
+from robots.guessing.doubt import Doubt
 from robots.guessing.stance import Stance
-from robots.parts import Fingers, GripperMaterial
+from robots.parts import Fingers, GripperMaterial, Vector3
 from robots.urdf.model import ModelJoint, UrdfModel
 
 SHORT = 0.6  # of the longest finger; what ends before it is a knuckle, not a tip
@@ -20,6 +21,10 @@ PAD = 0.02  # of a finger's length; a pad that ends so near the finger's end is 
 FLUSH = 5e-4  # m; how much farther in a pad must lie than what carries it
 CAP = 0.15  # of a finger's length; its corners within it from the end make its tip
 ALONG = 0.7  # cosine; how well a finger's y axis must lie along the way in which it opens
+EXACTLY = 0.95  # the same of its other axes
+STILL = 1e-3  # m; fingers whose tips part less do not open
+THUMB = ("thumb", "th")
+OPPOSITE = (("index", "ff"), ("middle", "mf"))  # fingers that a thumb meets, the first one first
 WIDE = 110.0  # degrees; of a finger that swings, as ManiSkill's SO-100 has it
 
 
@@ -52,6 +57,11 @@ class Fingertips:
             tips[limb.palm] = self._fixed_tip(self.ends[0], tips[self.ends[0]])
             self.ends = (limb.palm, *self.ends)
         self._tips = {link: tips[link] for link in self.ends}
+
+    @property
+    def are_jaws(self) -> bool:
+        """Whether there are two, and shapes tell where they are: so they meet in one place."""
+        return self.solid and len(self.ends) == 2
 
     def middle(self) -> Floats:
         """Return the place between the tips, in the root's frame, (3,) (m).
@@ -104,15 +114,30 @@ class Fingertips:
         way = axis if joint.unit == "m" else np.cross(axis, self._tips[end] - pose[:3, 3])
         return abs(float(way @ self._outwards(end)))
 
-    def opening(self, positions: Mapping[str, float]) -> list[float]:
-        """Return for each finger how well its y axis points away from the others, -1 … 1."""
-        poses = self.stance.poses(self.stance.with_joints(positions))[0]
-        places = self._places(poses)
-        ways = places - places.mean(axis=0)
-        ways /= np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-9)
-        links = [self.stance.tree.link(self.touching(end)) for end in self.ends]
-        axes = [poses[link, :3, 1] for link in links]
-        return [float(axis @ way) for axis, way in zip(axes, ways, strict=True)]
+    def grasping(self) -> tuple[str, str] | None:
+        """Return the two ends that grasp, or a thumb and the finger that it meets."""
+        thumbs = [end for end in self.ends if self.is_thumb(end)]
+        others = [end for end in self.ends if end not in thumbs]
+        if not thumbs or not others:
+            return (self.ends[0], self.ends[1]) if len(self.ends) == 2 else None
+        named = [[end for end in others if self.is_called(end, known)] for known in OPPOSITE]
+        return thumbs[0], next((ends[0] for ends in named if ends), others[0])
+
+    def opening(self, ends: Sequence[str], postures: Sequence[Mapping[str, float]]) -> Floats:
+        """Return which way two fingers open, in the frames of the links that touch, (2, 3).
+
+        That is how their tips part from the last of some postures to the first; where they stay as
+        far apart, it is the line from tip to tip. The frames are those of the posture half-way.
+        """
+        places = [self.ends.index(end) for end in ends]
+        poses = self.stance.poses(np.array([self.stance.with_joints(p) for p in postures]))
+        one, other = np.array([self._places(at)[places] for at in poses]).transpose(1, 0, 2)
+        gaps, half = one - other, len(postures) // 2
+        way = gaps[0] - gaps[-1]
+        way = gaps[half] if np.linalg.norm(way) < STILL else way
+        way /= max(float(np.linalg.norm(way)), 1e-9)
+        links = [self.stance.tree.link(self.touching(end)) for end in ends]
+        return (np.array([way, -way])[:, None] @ poses[half][links][:, :3, :3])[:, 0]
 
     def finger_of(self, link: str) -> ModelJoint:
         """Return the joint with which the finger of a link begins at the hand."""
@@ -121,13 +146,13 @@ class Fingertips:
 
     def is_thumb(self, link: str) -> bool:
         """Tell whether a link belongs to a finger that is called a thumb."""
-        return self.is_called(link, "thumb")
+        return self.is_called(link, THUMB)
 
-    def is_called(self, link: str, word: str) -> bool:
-        """Tell whether a link belongs to a finger that is called by a word."""
+    def is_called(self, link: str, known: tuple[str, ...]) -> bool:
+        """Tell whether a link belongs to a finger that is called by one of some words."""
         path = self.stance.model.path_to(link)
         names = [joint.name for joint in path if joint in self.limb.fingers]
-        return any(words.has(name, (word,)) for name in (link, *names))
+        return any(words.has(name, known) for name in (link, *names))
 
     def tip(self, end: str) -> Floats:
         """Return the tip of one of ``ends``, in the root's frame, (3,) (m)."""
@@ -170,30 +195,46 @@ def find_material(model: UrdfModel, limbs: Sequence[Limb]) -> GripperMaterial | 
 
 
 def find_fingers(
-    limb: Limb, tips: Fingertips | None, opened: Mapping[str, float]
+    limb: Limb, tips: Fingertips | None, postures: Sequence[Mapping[str, float]]
 ) -> tuple[Fingers | None, str]:
-    """Return the two links that grasp, if a limb has two that open along their y axes, and why.
+    """Return the two links that grasp, if a limb has two fingers or a thumb, and why.
 
     Args:
         limb: The limb.
         tips: The tips of its fingers, if it has any.
-        opened: Where its joints are when it is open (rad, m).
+        postures: Where its joints are, open first, then less and less (rad, m).
     """
-    none = "fingers: none, so grasps go unnoticed; a Fingers(...) with two links changes that"
-    if tips is None or len(tips.ends) != 2:
-        return None, none
-    ways = tips.opening(opened)
-    if min(abs(way) for way in ways) < ALONG:
-        return None, none
-    swings = any(joint.type != "prismatic" for joint in limb.fingers)
-    one, other = (1 if way > 0 else -1 for way in ways)
-    links = tips.touching(tips.ends[0]), tips.touching(tips.ends[1])
-    fingers = Fingers(links, opening_signs=(one, other))
-    if swings:
-        return Fingers(fingers.links, fingers.opening_signs, max_angle=WIDE), (
-            f"fingers: {' and '.join(links)} swing open along their y axes"
+    ends, which = tips.grasping() if tips else None, f"{limb.name} fingers".lstrip()
+    if tips is None or ends is None:
+        return None, Doubt(
+            f"{which}: none, as {'no two tips' if limb.fingers else 'no fingers'} are found, so"
+            " grasps go unnoticed; fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS)) with"
+            " the links that touch, and which way each opens in its own frame, changes that"
         )
-    return fingers, "fingers: both slide along their y axis, in which they open"
+    one, other = tips.touching(ends[0]), tips.touching(ends[1])
+    swings = any(joint.type != "prismatic" for joint in limb.fingers)
+    opening, axes = zip(*map(_signed_axis, tips.opening(ends, postures)), strict=True)
+    fingers = Fingers(
+        (one, other), opening, max_angle=WIDE if swings else Fingers.max_angle, opening_axes=axes
+    )
+    along = " and ".join(dict.fromkeys(map(_axis_name, axes)))
+    moves = "swing" if swings else "slide"
+    return fingers, f"{which}: {one} and {other} {moves} open along their {along}, as the tips part"
+
+
+def _signed_axis(way: Floats) -> tuple[int, Vector3]:
+    """Return sign and axis of a direction: y or another own axis that is near, else as it is."""
+    for axis, near in ((1, ALONG), (0, EXACTLY), (2, EXACTLY)):
+        if abs(way[axis]) >= near:
+            way = np.sign(way[axis]) * np.eye(3)[axis]
+    sign = 1 if way.sum() > 0 else -1
+    x, y, z = (round(sign * value, 3) + 0.0 for value in way.tolist())
+    return sign, (x, y, z)
+
+
+def _axis_name(axis: Vector3) -> str:
+    """Return ``"y axis"``, or the direction in numbers if it is along no own axis."""
+    return f"{'xyz'[axis.index(1.0)]} axis" if sorted(axis) == [0.0, 0.0, 1.0] else f"{axis}"
 
 
 def _finger_links(model: UrdfModel, limb: Limb) -> tuple[str, ...]:

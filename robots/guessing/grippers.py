@@ -36,6 +36,7 @@ from robots.urdf.model import ModelJoint
 
 SQUEEZE = 0.01  # how far beyond closed a parallel gripper's target is (m)
 SAME = 0.02  # of a range; how much two fingers' ranges may differ
+OFF = 0.05  # of a joint's range; how far one with a number of its own stands off its stops
 OPENINGS = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the way, in which a hand may stand
 MOST_JOINTS = 20  # of a hand whose fingers collide with each other
 USUALLY = 0.5  # of `POSTURES`; links of a hand that overlap so often are one mechanism
@@ -312,7 +313,9 @@ def _many(
     for part in OPENINGS:
         postures.append({})
         for joint in leaders:
-            value = part * middle_of(joint) + (1 - part) * sum(joint.span) / 2
+            low, high = joint.span
+            value = part * middle_of(joint) + (1 - part) * (low + high) / 2
+            value = min(max(value, low + OFF * (high - low)), high - OFF * (high - low))
             postures[-1].update(_led_to(followers[joint.name], value))
     return Gripper(groups, tuple(postures), (f"{name}: {counts}",))
 

@@ -18,7 +18,12 @@ def arm_groups(limb: Limb, drives: Drives) -> dict[str, JointGroup]:
         drives: The drives of its joints.
     """
     return {
-        name_of(limb, name): by_steps(joints, [drives.of(joint) for joint in joints])
+        name_of(limb, name): by_steps(
+            joints,
+            [drives.of(joint) for joint in joints],
+            reset_noise=joints[0].unit
+            == "rad",  # noise is the same number for all: 2 cm of a slide
+        )
         for name, joints in _by_unit("arm", limb.arm)
     }
 

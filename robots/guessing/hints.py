@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robots.guessing import words
 from robots.guessing.anatomy import FEWEST_ARM_JOINTS, Anatomy, Limb
 from robots.urdf.model import ModelJoint, UrdfModel
@@ -122,6 +123,40 @@ def known_anatomy(model: UrdfModel, found: Anatomy, hints: Hints) -> Anatomy:
         reasons.append(f"held still: {', '.join(held)}, of no arm of {hints.source}")
     parts = {part: group for part, group in parts.items() if group}
     return Anatomy(base, tuple(sorted(limbs, key=lambda limb: limb.name)), parts, tuple(reasons))
+
+
+def renamed(model: UrdfModel, found: Anatomy, names: Mapping[str, str]) -> Anatomy:
+    """Return a robot's parts with limbs that are called otherwise; those left out are held still.
+
+    Args:
+        model: What its URDF describes.
+        found: Its parts.
+        names: What each limb was called, by its new name.
+
+    Raises:
+        UnknownNameError: If there is no such limb.
+        DescriptorError: If a name is no word, or a limb is named twice.
+    """
+    limbs = {limb.name: limb for limb in found.limbs}
+    for new, old in names.items():
+        if old not in limbs:
+            raise UnknownNameError("limb", old, limbs)
+        if re.fullmatch("[A-Za-z0-9]+", new) is None:
+            raise DescriptorError(f"limbs: {new!r} names no limb; it takes letters and digits")
+    if len(set(names.values())) < len(names):
+        raise DescriptorError(f"limbs={dict(names)} names a limb twice")
+    kept = tuple(
+        replace(limbs[old], name=new if len(names) > 1 else "") for new, old in names.items()
+    )
+    off = [limb for name, limb in limbs.items() if name not in names.values()]
+    held = tuple(joint for limb in off for joint in (*limb.arm, *limb.fingers))
+    body = tuple(j for j in model.moving if j in held or j in found.parts.get("body", ()))
+    parts = {**found.parts, **({"body": body} if body else {})}
+    reasons = [reason for reason in found.reasons if not reason.startswith("limbs: ")]
+    if held:
+        listing = ", ".join(joint.name for joint in held)
+        reasons.append(f"held still: {listing}, as limbs={dict(names)} leaves them out")
+    return Anatomy(found.base, kept, parts, tuple(reasons))
 
 
 def known_tip(model: UrdfModel, limb: Limb, hints: Hints) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from robot_layouts.kinematics.rotations import Floats
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
 from robots.guessing.anatomy import Limb, flies
+from robots.guessing.doubt import Doubt
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
 from robots.urdf.model import ModelJoint
@@ -23,6 +24,9 @@ TRIES = 3  # rounds of that, each without the overlaps met before
 ROUNDS = 4  # of refinement, each with half the spread
 ROOM = 0.15  # rad, of each joint, in which nothing may overlap either
 ROOM_TRIES = 6  # random motions of all joints by so much, besides those of one alone
+SHAKEN = 0.06  # rad; the same of a posture that is known: three times what resets draw
+BEHIND = 0.1  # of the reach; how far behind the limb a TCP may be in a posture that is known
+OFF = 0.05  # of a joint's range; how far it stands off its stops at least
 OUT = 0.55  # of the reach; where the TCP is best, ahead of the limb's first joint
 NEAR, FAR = 0.35, 0.85  # of the reach; where it may be
 HEIGHT = 0.35  # of the reach, above the ground; best for an arm that stands on it
@@ -143,7 +147,9 @@ class PostureSearch:
         self._ground = self._lowest()
 
     def given(self, joints: Mapping[str, float], where: str) -> Posture:
-        """Return a posture that is known, with the hands open.
+        """Return a posture that is known, with the hands open, or a better one if it is no good.
+
+        It is none if links overlap in it, or with a little noise, or if a TCP is behind its limb.
 
         Args:
             joints: Where joints are (rad, m); the others stay where the search starts.
@@ -155,7 +161,33 @@ class PostureSearch:
             if leader.name in joints and leader.name not in self._hands
         }
         about = f"{where}, the hands open" if self._hands else where
-        return self._made(self._stance.with_joints(known, self._start), about)
+        posture = self._stance.with_joints(known, self._start)
+        why = self._objection(posture)
+        if not why:
+            return self._made(posture, about)
+        found = self.run()
+        if self._left(found.position) > self._left(posture):
+            return self._made(posture, about)
+        instead = Doubt(f"keyframe 'rest' is not {where}: {why}")
+        return replace(found, reasons=(*found.reasons, instead))
+
+    def _objection(self, posture: Floats) -> str:
+        """Return why one should not start in a posture, or nothing."""
+        if self._left(posture):
+            return "links overlap in it"
+        if any(self._near(view, posture, self._pairs, SHAKEN) for view in self._views):
+            return f"links overlap within {SHAKEN:g} rad of it"
+        self._look(posture, [self._draw(view, posture) for view in self._views])
+        if any(self._is_behind(view, posture) for view in self._views):
+            return "the TCP is behind the limb in it"
+        return ""
+
+    def _is_behind(self, view: View, posture: Floats) -> bool:
+        """Tell whether a TCP is behind its shoulder, however a first upright joint is turned."""
+        turned = posture.copy()
+        if len(self._views) == 1 and view.is_upright:
+            turned[view.free[0]] = view.limits[:, 0].mean()
+        return float(view.places(turned[None])[0] @ self._front) < -BEHIND * view.reach
 
     def run(self) -> Posture:
         """Return the posture with all joints at 0 or mid-range if it is fine, else a better one."""
@@ -180,15 +212,29 @@ class PostureSearch:
         )
 
     def _made(self, position: Floats, about: str) -> Posture:
-        """Return a posture, with what overlaps in it and the reason."""
+        """Return a posture, off the joints' stops, with what overlaps in it and the reason."""
+        off = self._off_stops(position)
+        if not np.array_equal(off, position) and self._left(off) <= self._left(position):
+            position, about = off, f"{about}; joints that stood at a stop are off it"
         links = [self._stance.tree.links[hull.link] for hull in self._hulls]
         left = self._pairs[self._overlaps(position, self._pairs)]
         pairs = tuple(dict.fromkeys((links[a], links[b]) for a, b in left.tolist()))
         reasons = [f"keyframe 'rest': {about}"]
         if pairs:
             listing = ", ".join(f"{one} and {other}" for one, other in pairs)
-            reasons.append(f"allowed_collisions, too: {listing}, which overlap in that posture")
+            overlaps = f"allowed_collisions, too: {listing}, which overlap in that posture"
+            reasons.append(Doubt(overlaps))
         return Posture(position, pairs, tuple(reasons))
+
+    def _off_stops(self, position: Floats) -> Floats:
+        """Return a posture in which an action moves every joint of an arm both ways."""
+        moved = position.copy()
+        for view in self._views:
+            low, high = view.limits[:, view.bounded]
+            some = np.array(view.free)[view.bounded]
+            margin = OFF * (high - low)
+            moved[some] = np.clip(position[some], low + margin, high - margin)
+        return moved
 
     def _starts(self) -> Iterator[Floats]:
         """Yield the postures to search from: as it stands, and with its torso half-way up."""
@@ -327,13 +373,15 @@ class PostureSearch:
                 counts.append((int(overlaps.sum()), near, len(counts), tried))
         return min(counts)[3]
 
-    def _near(self, view: View, posture: Floats, pairs: NDArray[np.intp]) -> int:
+    def _near(
+        self, view: View, posture: Floats, pairs: NDArray[np.intp], room: float = ROOM
+    ) -> int:
         """Return how many of some small motions of a limb make something overlap."""
         count = len(view.free)
-        together = np.random.default_rng(0).choice([-ROOM, ROOM], (ROOM_TRIES, count))
-        moves = np.concatenate([together, ROOM * np.eye(count), -ROOM * np.eye(count)])
+        together = np.random.default_rng(0).choice([-room, room], (ROOM_TRIES, count))
+        moves = np.concatenate([together, room * np.eye(count), -room * np.eye(count)])
         moved = np.tile(posture, (len(moves), 1))
-        moved[:, view.free] += np.where(view.slides, moves * ROOM, moves)
+        moved[:, view.free] += np.where(view.slides, moves * room, moves)
         return sum(self._any(poses, pairs) for poses in self._stance.poses(moved))
 
     def _without(self, pairs: NDArray[np.intp], drawn: Floats, view: View) -> Floats:

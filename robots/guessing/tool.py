@@ -13,6 +13,7 @@ from robot_layouts.kinematics.solve import farthest
 from robot_layouts.kinematics.tree import Tree
 from robots.guessing import words
 from robots.guessing.anatomy import Limb, flies
+from robots.guessing.doubt import Doubt
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.stance import Stance
 from robots.parts import Vector3
@@ -22,7 +23,7 @@ from robots.urdf.tree import kinematic_tree
 
 BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
 EXACT = 0.02  # m; farther away, the reason says so
-OPPOSITE = ("index", "middle")  # fingers that a thumb meets, the first one first
+CLOSE = 0.01  # m; the farthest that a TCP may be from the place between two tips that are known
 BLIND = (*words.HEAD, "optical", "imu", "ft", "force", "torque", "inertia", "range", "led")
 STARTS = 8  # of the search for the reach
 
@@ -106,14 +107,17 @@ def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
             return Tool(named[0], (), reason)
     if not rigid:
         return Tool(
-            limb.palm, (), f"{which}: the link {limb.palm}, the last one, as no tool is named"
+            limb.palm,
+            (),
+            Doubt(f"{which}: the link {limb.palm}, the last one, as no tool is named"),
         )
     seen = {*stance.model.collisions, *stance.model.visuals}
     solid = [link for link in rigid if link in seen] or rigid
     places = stance.places((limb.palm, *solid))
     far = np.linalg.norm(places[1:] - places[0], axis=1)
     last = solid[int(np.argmax(np.round(far, 6)))]
-    return Tool(last, (), f"{which}: the link {last}, the farthest one, as no tool is named")
+    reason = f"{which}: the link {last}, the farthest one, as no tool is named"
+    return Tool(last, (), Doubt(reason))
 
 
 def _between(
@@ -135,10 +139,9 @@ def _between(
         ends = [link for link in ends if link not in still]
     named = min(((off((link,)), link) for link in ends), default=(np.inf, ""))
     if named[0] <= BETWEEN:
-        reason = f"{which}: the link {named[1]}, which lies between the finger tips"
-        return Tool(named[1], (), reason)
+        return _named(stance, tips, which, named[1], named[0])
     frames = _grasping(stance, tips)
-    if off(frames) <= near:
+    if off(frames) <= (CLOSE if tips.are_jaws else near):
         return _mean(stance, limb, frames, which, off(frames), middle)
     if tips.solid:
         return _beside(stance, limb, which, off((limb.palm,)), middle)
@@ -148,7 +151,15 @@ def _between(
         return _mean(stance, limb, best, which, distance, middle)
     only = ", which is only the palm" if best == (limb.palm,) else ", the nearest to the tips"
     apart = _apart(distance, _seen_from(stance, best[0], middle))
-    return Tool(best[0], (), f"{which}: the link {best[0]}{only}{apart}")
+    return Tool(best[0], (), Doubt(f"{which}: the link {best[0]}{only}{apart}"))
+
+
+def _named(stance: Stance, tips: Fingertips, which: str, link: str, distance: float) -> Tool:
+    """Return a named frame, or the place between the tips beside it if these are known better."""
+    if distance <= CLOSE or not tips.are_jaws:
+        return Tool(link, (), f"{which}: the link {link}, which lies between the finger tips")
+    reason = f"{which}: {distance * 100:.0f} cm from the link {link}, where the finger tips meet"
+    return Tool(link, (), reason, _seen_from(stance, link, tips.middle()))
 
 
 def _mean(
@@ -161,7 +172,8 @@ def _mean(
 ) -> Tool:
     listing = ", ".join(links[:-1]) + f" and {links[-1]}"
     reason = f"{which}: the middle of {listing}, turned as {limb.palm}"
-    return Tool(limb.palm, links, reason + _apart(distance, _seen_from(stance, limb.palm, middle)))
+    apart = _apart(distance, _seen_from(stance, limb.palm, middle))
+    return Tool(limb.palm, links, Doubt(reason + apart) if apart else reason)
 
 
 def _beside(stance: Stance, limb: Limb, which: str, distance: float, middle: Floats) -> Tool:
@@ -181,15 +193,8 @@ def _seen_from(stance: Stance, link: str, place: Floats) -> Vector3:
 
 
 def _grasping(stance: Stance, tips: Fingertips) -> tuple[str, ...]:
-    """Return the frame at the tip of each finger that grasps: all, or a thumb and its opposite."""
-    frames = {end: _frame_at(stance, tips, end) for end in tips.ends}
-    thumbs = [end for end in tips.ends if tips.is_thumb(end)]
-    others = [end for end in tips.ends if end not in thumbs]
-    if not thumbs or not others:
-        return tuple(frames.values())
-    named = [[end for end in others if tips.is_called(end, word)] for word in OPPOSITE]
-    opposite = next((ends[0] for ends in named if ends), others[0])
-    return (frames[thumbs[0]], frames[opposite])
+    """Return the frame at the tip of each finger that grasps."""
+    return tuple(_frame_at(stance, tips, end) for end in tips.grasping() or tips.ends)
 
 
 def _frame_at(stance: Stance, tips: Fingertips, end: str) -> str:
@@ -259,7 +264,9 @@ def find_reach(
     limits[free] = np.array([joint.span for joint in moving]).reshape(-1, 2)
     found = farthest(replace(tree, limits=limits), palm, point, starts, free)
     if found < 0.01 or len(moving) < len(limb.arm):
-        return 1.0, "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"
+        return 1.0, Doubt(
+            "reach: 1 m, without ground, as nothing stands fixed or nothing reaches out"
+        )
     return round(found, 3), (
         "reach: the TCP's largest distance from the base's z axis within the joint limits;"
         " data sheets, which measure to the flange, give less"

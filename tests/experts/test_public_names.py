@@ -38,6 +38,23 @@ def test_jaws_whose_tips_make_the_tcp_have_a_frame():
     assert gripper_turn(same) is None  # nothing says how it opens
 
 
+def test_fingers_say_where_a_gripper_points_whose_tcp_link_does_not():
+    """A Fetch's TCP link has x ahead, and a Panda's z."""
+    turned = gripper_turn(RobotRegistry.load("fetch"))
+    np.testing.assert_allclose(rotate(turned, [0, 0, 1]), [1, 0, 0], atol=0.01)
+    np.testing.assert_allclose(rotate(turned, [0, 1, 0]), [0, 1, 0], atol=0.01)
+
+
+def test_a_limb_whose_tips_make_its_tcp_has_a_frame_too():
+    dual = RobotRegistry.load("mobile_panda_dual")
+    fingers = ("left_panda_leftfinger", "left_panda_rightfinger")
+    left = replace(dual.limbs["left"], tcp_link="left_panda_hand", tcp_position_links=fingers)
+    limb = replace(dual, limbs={**dual.limbs, "left": left}).parts["left"]
+    turned = gripper_turn(limb)
+    np.testing.assert_allclose(rotate(turned, [0, 0, 1]), [0, 0, 1], atol=0.01)
+    np.testing.assert_allclose(np.abs(rotate(turned, [0, 1, 0])), [0, 1, 0], atol=0.01)
+
+
 def _pick_small_cube(scene):
     """Grips a little above the cube's middle, jaws half closed, then carried in parts."""
 

@@ -139,6 +139,7 @@ DECLARATIONS: dict[str, tuple[Callable[..., object], dict[str, tuple[Mapping[str
             "opening_signs": ({"0": (0, 1), "2": (2, 1), "one": (1,), "halves": (0.5, 1)},),
             "min_force": (NO_NUMBERS, {"negative": -1.0}),
             "max_angle": (NO_NUMBERS, {"negative": -1.0, "200": 200.0}),
+            "opening_axes": (NO_TUPLES, {"one": ((0, 1, 0),), "0": ((0, 0, 0), (0, 1, 0))}),
         },
     ),
     "CameraMount": (

@@ -128,6 +128,10 @@ def test_a_descriptor_refuses_nonsense(changes, message):
         (lambda: GripperMaterial(("a",), 1.0, 1.0, 2.0), "restitution is 2.0; it must be between"),
         (lambda: Fingers(("a",)), "Fingers: links has 1 entries; it must be a tuple of 2"),
         (lambda: Fingers(("a", "b"), (0, 1)), "opening_signs is (0, 1); each must be 1 or -1"),
+        (
+            lambda: Fingers(("a", "b"), opening_axes=((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))),
+            "opening_axes is ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)); each must have a length",
+        ),
         (lambda: Fingers(("a", "b"), max_angle=-1.0), "max_angle is -1.0 degrees; it must be"),
         (lambda: CameraMount("", "hand"), "CameraMount: name is ''; it must be a text"),
         (lambda: CameraMount("eye", "hand", width=0), "camera 'eye': width is 0 pixels"),

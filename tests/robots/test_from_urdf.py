@@ -127,7 +127,7 @@ class TestWhatIsSaid:
             "TCP: the link panda_hand_tcp, named like tcp",
             "drives: stiffness from the inertia that hangs on each joint",
             "keyframe 'rest': ",
-            "fingers: both slide along their y axis",
+            "fingers: panda_leftfinger and panda_rightfinger slide open along their y axis",
             "reach: the TCP's largest distance",
         ):
             assert f"\n  {reason}" in said
@@ -161,7 +161,7 @@ class TestWhatIsSaid:
         parts = Parts()
         palm = parts.arm(parts.link("base"), "arm", "0 0 0.1")
         for side, sign in (("left", 1), ("right", -1)):
-            parts.link(side, 0.05, "0.04 0.01 0.02", "0.02 0 0")
+            parts.link(side, 0.05, "0.012 0.01 0.02", "0 0 0")
             axis, at = f"0 {sign} 0", f"0.05 {0.006 * sign} 0"
             parts.joint(side, palm, side, at, axis=axis, limits=(0, 0.04), kind="prismatic")
         path = parts.write(tmp_path)
@@ -227,6 +227,8 @@ def run(source: str, robot: str) -> RobotDescriptor:
 class TestCommand:
     def test_it_prints_reasons_or_the_module(self, capsys):
         assert main([str(urdf_of("so100")), "--name", "tiny"]) == 0
+        assert capsys.readouterr().out.splitlines()[-1].endswith(" more reasons: --all")
+        assert main([str(urdf_of("so100")), "--name", "tiny", "--all"]) == 0
         assert "gripper: one jaw, gripper, the last joint" in capsys.readouterr().out
         assert main([str(urdf_of("so100")), "--name", "tiny", "--module"]) == 0
         assert "TINY = RobotDescriptor(" in capsys.readouterr().out

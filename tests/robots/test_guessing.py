@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from robots import RobotDescriptor
+from robots import LocalUrdf, RobotDescriptor, RobotLayoutsError
 from robots.bodies.hulls import load_model
 from robots.bodies.overlaps import overlapping
 from robots.from_urdf import Guess, guess_descriptor
+from robots.guess import guess as guess_robot
+from robots.guessing.hints import Hints
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from tests.robots.urdf_parts import Parts
@@ -92,6 +95,37 @@ class TestLimbs:
         assert [name for name in joints_of(guess(parts, tmp_path)) if "arm" in name] == [
             "arm_1", "arm_2", "arm_3",
         ]  # fmt: skip
+
+    @pytest.mark.parametrize("off", [False, True])
+    def test_limbs_are_renamed_or_turned_off(self, tmp_path, off):
+        parts = torso()
+        for i, y in enumerate((-0.3, 0.0, 0.3), start=1):
+            parts.arm("lifted", f"x{i}", f"0.1 {y} 0.1")
+        file = parts.write(tmp_path)
+        limbs = {"low": "1"} if off else {"low": "1", "high": "3"}
+        found = guess_descriptor(file, limbs=limbs)
+        groups = joints_of(found)
+        assert set(found.descriptor.limbs) == (set() if off else {"low", "high"})
+        assert groups["arm" if off else "low_arm"] == {f"x1_joint{i}" for i in range(1, 7)}
+        assert {f"x2_joint{i}" for i in range(1, 7)} <= groups["body"]
+        assert found.descriptor.action_dim == (6 if off else 12)
+        assert any(r.startswith("held still: x2_joint1, ") for r in found.reasons)
+        assert any("limbs={NAME: '1', NAME: '2'}" in r for r in guess_descriptor(file).doubts)
+
+    @pytest.mark.parametrize(
+        ("limbs", "message"),
+        [
+            ({"left": "4"}, "unknown limb '4'"),
+            ({"left_arm": "1"}, "'left_arm' names no limb; it takes letters and digits"),
+            ({"a": "1", "b": "1"}, "names a limb twice"),
+        ],
+    )
+    def test_limbs_that_there_are_not_are_refused(self, tmp_path, limbs, message):
+        parts = torso()
+        for i, y in enumerate((-0.3, 0.0, 0.3), start=1):
+            parts.arm("lifted", f"x{i}", f"0.1 {y} 0.1")
+        with pytest.raises(RobotLayoutsError, match=message):
+            guess_descriptor(parts.write(tmp_path), limbs=limbs)
 
     def test_head_wheels_and_legs_are_held_and_the_reason_says_how_to_drive_them(self, tmp_path):
         parts = torso()
@@ -285,6 +319,70 @@ class TestHands:
         assert "gripper" not in joints_of(guess(parts, tmp_path))
 
 
+def sliding(parts: Parts, palm: str, way: tuple[float, float, float]) -> None:
+    """Add two fingers whose frames are the palm's and that slide apart along a direction."""
+    for name, sign in (("one", 1), ("two", -1)):
+        x, y, z = (sign * part for part in way)
+        parts.link(f"finger_{name}", 0.05, "0.06 0.01 0.01", "0.03 0 0")
+        parts.joint(
+            f"slide_{name}", palm, f"finger_{name}", f"{0.05 + x / 100} {y / 100} {z / 100}",
+            axis=f"{x} {y} {z}", limits=(0.0, 0.03), kind="prismatic",
+        )  # fmt: skip
+
+
+class TestFingers:
+    @pytest.mark.parametrize(
+        ("way", "axis"),
+        [
+            ((0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+            ((0.0, 0.8, 0.6), (0.0, 1.0, 0.0)),  # near enough
+            ((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)),
+            ((0.0, 0.6, 0.8), (0.0, 0.6, 0.8)),
+        ],
+    )
+    def test_fingers_open_the_way_their_tips_part(self, tmp_path, way, axis):
+        parts, last = single_arm(end="")
+        sliding(parts, last, way)
+        fingers = guess(parts, tmp_path).descriptor.fingers
+        assert fingers.links == ("finger_one", "finger_two")
+        assert fingers.opening_signs == (1, -1)
+        assert fingers.opening_axes == (axis, axis)
+
+    def test_a_jaw_opens_across_the_way_from_its_hinge(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.link("jaw", 0.05, "0.08 0.01 0.02", "0.05 0 0")
+        parts.joint("jaw_joint", last, "jaw", "0.03 0 0.03", axis="0 -1 0", limits=(0.0, 1.0))
+        fingers = guess(parts, tmp_path).descriptor.fingers
+        assert fingers.links == (last, "jaw")
+        assert fingers.max_angle == 110.0
+        signed = np.array(fingers.opening_axes) * np.array(fingers.opening_signs)[:, None]
+        assert signed[1] @ (0.0, 0.0, 1.0) > 0.95
+        assert signed[0] @ (0.0, 0.0, -1.0) > 0.8
+
+    def test_a_thumb_grasps_with_the_finger_that_it_meets(self, tmp_path):
+        parts, last = single_arm(end="")
+        for name, y, z, axis in (
+            ("ring", -0.02, 0.03, 1), ("thumb", 0.0, -0.03, -1), ("index", 0.02, 0.03, 1)
+        ):  # fmt: skip
+            parts.link(name, 0.02, "0.06 0.01 0.01", "0.03 0 0")
+            parts.joint(f"{name}_joint", last, name, f"0.05 {y} {z}", axis=f"0 {axis} 0",
+                        limits=(0.0, 0.8))  # fmt: skip
+        fingers = guess(parts, tmp_path).descriptor.fingers
+        assert fingers.links == ("thumb", "index")
+        assert fingers.opening_signs == (-1, 1)
+        assert fingers.opening_axes[0][2] > 0.9
+
+    def test_a_reason_says_how_fingers_are_given(self, tmp_path):
+        parts, last = single_arm(end="")
+        for i, y in enumerate((-0.03, 0.0, 0.03)):
+            parts.link(f"n{i}", 0.02, "0.03 0.01 0.01", "0.015 0 0")
+            parts.joint(f"root{i}", last, f"n{i}", f"0.05 {y} 0", axis="0 1 0", limits=(0.0, 1.5))
+        found = guess(parts, tmp_path)
+        assert found.descriptor.fingers is None
+        reason = next(r for r in found.reasons if r.startswith("fingers"))
+        assert "fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS))" in reason
+
+
 class TestTool:
     def test_a_frame_between_the_fingers_goes_before_the_palm(self, tmp_path):
         parts, last = single_arm(end="")
@@ -317,6 +415,15 @@ class TestTool:
         np.testing.assert_allclose(found.descriptor.tcp_offset, (0.3, 0.0, 0.0), atol=0.02)
         reason = next(r for r in found.reasons if r.startswith("TCP"))
         assert reason.startswith("TCP: 30 cm from the link a_link6, where the finger tips meet")
+
+    def test_a_frame_that_is_not_between_the_tips_is_moved_there(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.jaws(last, "a")  # whose tips meet 0.106 m ahead
+        parts.frame("ee_link", last, "0.08 0.005 0")
+        found = guess(parts, tmp_path)
+        assert found.descriptor.tcp_link == "ee_link"
+        np.testing.assert_allclose(found.descriptor.tcp_offset, (0.026, -0.005, 0), atol=0.005)
+        assert any(r.startswith("TCP: 3 cm from the link ee_link") for r in found.reasons)
 
     @pytest.mark.parametrize("end", ["tool0", "ee_link", "suction_cup", "flange"])
     def test_an_arm_without_gripper_ends_in_its_tool(self, tmp_path, end):
@@ -364,6 +471,73 @@ class TestPosture:
         found = guess(parts, tmp_path)
         assert found.descriptor.keyframe("rest") == (0.0,) * 6
         assert any("keyframe 'rest': joints at 0" in reason for reason in found.reasons)
+
+    @pytest.mark.parametrize(
+        ("at", "why"),
+        [
+            ({"a_joint3": 1.7, "a_joint4": 1.7, "a_joint5": 0.5}, "links overlap"),
+            ({"a_joint2": -1.6, "a_joint3": -1.6}, "the TCP is behind the limb in it"),
+        ],
+    )
+    def test_a_known_posture_that_is_no_good_is_not_the_one_to_start_in(self, tmp_path, at, why):
+        parts, _ = single_arm()
+        joints = {f"a_joint{i}": at.get(f"a_joint{i}", 0.0) for i in range(1, 7)}
+        hints = Hints(source="the file", postures={"home": joints})
+        found = guess_robot(LocalUrdf(str(parts.write(tmp_path))), None, {}, hints=hints)
+        robot = found.descriptor
+        assert robot.keyframe("home") == tuple(joints.values())
+        assert robot.keyframe("rest") != robot.keyframe("home")
+        assert rest_overlaps(robot) == 0
+        said = f"keyframe 'rest' is not the posture 'home' of the file: {why}"
+        assert any(reason.startswith(said) for reason in found.reasons)
+
+    def test_a_known_posture_is_kept_but_off_its_stops(self, tmp_path):
+        parts, _ = single_arm()
+        joints = {f"a_joint{i}": 0.0 for i in range(1, 7)} | {"a_joint6": 1.8}
+        hints = Hints(source="the file", postures={"home": joints})
+        found = guess_robot(LocalUrdf(str(parts.write(tmp_path))), None, {}, hints=hints)
+        assert found.descriptor.keyframe("rest") == pytest.approx([0, 0, 0, 0, 0, 1.62])
+        assert any("off it" in r for r in found.reasons if r.startswith("keyframe 'rest'"))
+
+    def test_slides_take_no_joint_noise_and_telescopes_may_overlap(self, tmp_path):
+        parts = Parts()
+        parent = parts.link("base", 5.0, "0.3 0.3 0.1")
+        for i in range(1, 4):  # each starts inside the one before
+            child = parts.link(f"tube{i}", size=f"{0.4 - 0.02 * i} 0.05 0.05", at="0.2 0 0")
+            at = "0 0 0.3" if i == 1 else "0.02 0 0"
+            parts.joint(f"out{i}", parent, child, at, axis="1 0 0", limits=(0.0, 0.3),
+                        kind="prismatic")  # fmt: skip
+            parent = child
+        parts.arm(parent, "a", "0.4 0 0.1")
+        robot = guess(parts, tmp_path).descriptor
+        groups = robot.action_split.groups
+        assert groups["arm_slide"].joints == ("out1", "out2", "out3")
+        assert not groups["arm_slide"].reset_noise
+        assert groups["arm"].reset_noise
+        assert ("tube1", "tube3") in robot.allowed_collisions
+
+    @pytest.mark.parametrize("turns_first", [True, False])
+    def test_a_base_that_turns_and_slides_far_is_no_part_of_the_arm(self, tmp_path, turns_first):
+        parts = Parts()
+        parts.link("ground", 1.0)
+        parts.link("platform", 5.0, "0.3 0.3 0.1")
+        far: dict[str, Any] = {"limits": (-1e3, 1e3), "kind": "prismatic"}
+        if turns_first:
+            parts.link("turned")
+            parts.joint("wheel_yaw", "ground", "turned", "0 0 0")
+            parts.joint("way", "turned", "platform", "0 0 0", axis="1 0 0", **far)
+            base = {"wheel_yaw", "way"}
+        else:
+            parts.link("along_x")
+            parts.link("along_y")
+            parts.joint("x", "ground", "along_x", "0 0 0", axis="1 0 0", **far)
+            parts.joint("y", "along_x", "along_y", "0 0 0", axis="0 1 0", **far)
+            parts.joint("th", "along_y", "platform", "0 0 0")
+            base = {"x", "y", "th"}
+        parts.arm("platform", "a", "0 0 0.1")
+        groups = joints_of(guess(parts, tmp_path))
+        assert groups["arm"] == {f"a_joint{i}" for i in range(1, 7)}
+        assert groups.get("base", set()) | groups["base_slide"] == base
 
     def test_joints_stay_away_from_their_limits(self, tmp_path):
         parts, _ = single_arm()

@@ -10,10 +10,10 @@ import pytest
 import torch
 
 import tasks
-from layouts import Layout, Placement
+from layouts import Layout, Placement, at_task
 from robot_layouts.experts import Rehearsal, Waypoint, find_expert
 from robots import TaskError, UnknownNameError
-from tasks.registry import TASKS
+from tasks.registry import TASKS, make_scenario
 from tests.catalogue import optional_problem
 
 TWO = "TwoRobotPickCube-v1"
@@ -84,6 +84,13 @@ def test_every_limb_is_an_agent():
         np.testing.assert_array_equal(observations[name][: 2 * dof], joints)
         assert observations[name].shape == env.observation_space(name).shape
     env.step({name: env.action_space(name).sample() for name in env.agents})
+
+
+def test_one_robot_of_two_limbs_stands_where_both_reach():
+    task = tasks.get_task_class(TWO)
+    layout = make_scenario(task, robots="baxter").layout
+    assert layout == at_task("baxter", task)
+    assert {"left", "right"} <= {name.rpartition(".")[2] for name in layout.arms}
 
 
 def test_places_that_no_limb_takes_are_refused():

@@ -1,0 +1,120 @@
+"""Other robots at a task's places, where they reach what the task's own robots do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from layouts.layout import Layout
+from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
+from robot_layouts.core.quoting import shown
+from robot_layouts.kinematics.quaternions import yaw_quaternion
+from robot_layouts.kinematics.rotations import Floats, rotate
+from robots import LayoutError, RobotDescriptor, UnknownNameError
+
+# Shares of a reach at which what is worked on lies ahead. A Panda of ManiSkill stands 0.615 m, or
+# 0.72 of its reach, behind the middle of its table; two arms of one body reach over all of it.
+ALONE, BODY = 0.72, 0.6
+SHOULDER = 0.25  # of a limb's reach; how high its first joint is above where arms of the task stand
+NAME = "robot"  # of the place of one robot that serves all roles
+
+
+def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> Layout:
+    """Return a task's layout with other robots, each where it reaches what the task's own does.
+
+    A robot stands on the line from the task's own to the middle of what is worked on, as far from
+    it as its reach asks for, turned towards it and at the same height. One robot of several limbs
+    serves several places at once: its limbs are called like them, the left one serving the first
+    unless they are called so already, and its shoulders are above the places.
+
+    Nothing is checked; `Layout.validate` and `tasks.make` do so.
+
+    Args:
+        robots: Robot by place, for some or all of them; or one robot for all.
+        task: The task, its class, or a layout with its places.
+
+    Raises:
+        LayoutError: If the task has no layout, or more places than the robot has limbs.
+        UnknownNameError: If there is no such place or robot.
+
+    Example:
+        >>> import layouts, tasks
+        >>> two = tasks.get_task_class("TwoRobotPickCube-v1")
+        >>> list(layouts.at_task("baxter", two).arms)
+        ['robot.left', 'robot.right']
+    """
+    layout = task if isinstance(task, Layout) else getattr(task, "layout", None)
+    if not isinstance(layout, Layout):
+        raise LayoutError(f"task is {shown(task)}; a task, its class or a Layout is needed")
+    if not isinstance(robots, Mapping):
+        robot = load_robot(robots)
+        if robot.limbs:
+            return Layout({NAME: _body(robot, layout)}, layout.frames)
+        robots = dict.fromkeys(layout, robot)
+    check_robots(robots)
+    for place in robots:
+        if place not in layout:
+            raise UnknownNameError("place", place, layout)
+    middle = _middle(layout)
+    changed = {place: _moved(layout[place], load_robot(r), middle) for place, r in robots.items()}
+    return Layout({**layout, **changed}, layout.frames)
+
+
+def _moved(placement: Placement, robot: RobotDescriptor, middle: Floats) -> Placement:
+    """Return a placement with another robot, as near to the middle as its reach asks for."""
+    if placement.keyframe not in robot.keyframes:
+        placement = replace(placement, keyframe=None)
+    own = placement.robot
+    if robot == own or placement.on is not None:
+        return placement.with_robot(robot)
+    x, y, z = placement.base_position
+    x, y = (middle + (np.array([x, y]) - middle) * robot.reach / own.reach).round(4).tolist()
+    turned = faced(robot, placement.facing)
+    return replace(placement, robot=robot, position=(x, y, z), quaternion=turned)
+
+
+def _body(robot: RobotDescriptor, layout: Layout) -> Placement:
+    """Return where a robot stands whose limbs serve all places."""
+    roles = _roles(robot, list(layout))
+    limb, role = robot.limbs[next(iter(roles.values()))], next(iter(roles))
+    middle, own = _middle(layout), layout[role]
+    left = np.array(own.base_position[:2]) - middle
+    if len(layout) == 1:  # then it stands behind the middle, as the task's own does
+        left = np.array([left[1], -left[0]])
+    yaw = math.atan2(-left[0], left[1])  # of what has that direction to its left
+    ahead, (x, y, height) = BODY * limb.reach, limb.base
+    back = x + math.sqrt(max(ahead**2 - y**2, 0.0))
+    at = middle - back * np.array([math.cos(yaw), math.sin(yaw)])
+    place = (*at.round(4).tolist(), round(own.base_position[2] + SHOULDER * limb.reach - height, 4))
+    owners = {name: tuple(part.action_split.groups) for name, part in robot.parts.items()}
+    limbs = {role: replace(robot.limbs[name], groups=owners[name]) for role, name in roles.items()}
+    others = {name: part for name, part in robot.limbs.items() if name not in roles.values()}
+    serving = robot if list(roles) == list(roles.values()) else replace(robot, limbs=limbs | others)
+    return Placement(serving, place, faced(robot, yaw_quaternion(yaw)))
+
+
+def _roles(robot: RobotDescriptor, places: Sequence[str]) -> dict[str, str]:
+    """Return the limb that serves each place, the left one's first."""
+    from_left = sorted(robot.limbs, key=lambda name: -robot.limbs[name].base[1])
+    if len(places) > len(from_left):
+        raise LayoutError(
+            f"{robot.name} has {len(from_left)} limbs ({', '.join(from_left)}), and the task"
+            f" {len(places)} places ({', '.join(places)})"
+        )
+    if set(places) <= set(from_left):
+        return {name: name for name in from_left if name in places}
+    return dict(zip(places, from_left, strict=False))
+
+
+def _middle(layout: Layout) -> Floats:
+    """Return the middle of what the robots of a task's layout work on, (2,) (m)."""
+    bases = np.array([placement.base_position[:2] for placement in layout.values()])
+    if len(bases) > 1:
+        return bases.mean(axis=0)
+    (placement,) = layout.values()
+    ahead = rotate(np.array(placement.facing), np.array([1.0, 0.0, 0.0]))[:2]
+    return bases[0] + ALONE * placement.robot.reach * ahead / max(np.linalg.norm(ahead), 1e-9)
