@@ -18,7 +18,9 @@ def arm_groups(limb: Limb, drives: Drives) -> dict[str, JointGroup]:
         drives: The drives of its joints.
     """
     return {
-        name_of(limb, name): by_steps(joints, [drives.of(joint) for joint in joints])
+        name_of(limb, name): by_steps(
+            joints, [drives.of(joint) for joint in joints], approximate_ik=True
+        )
         for name, joints in _by_unit("arm", limb.arm)
     }
 
@@ -43,7 +45,11 @@ def held_groups(anatomy: Anatomy, drives: Drives) -> dict[str, JointGroup]:
 
 
 def by_steps(
-    joints: Sequence[ModelJoint], drives: Sequence[Drive], *, reset_noise: bool = True
+    joints: Sequence[ModelJoint],
+    drives: Sequence[Drive],
+    *,
+    reset_noise: bool = True,
+    approximate_ik: bool = False,
 ) -> JointGroup:
     """Return a group whose numbers move its joints by steps.
 
@@ -51,6 +57,7 @@ def by_steps(
         joints: Its joints.
         drives: Their drives.
         reset_noise: Whether a reset adds joint noise.
+        approximate_ik: See `robots.JointGroup`.
     """
     steps = [drive.step for drive in drives]
     return JointGroup(
@@ -61,6 +68,7 @@ def by_steps(
         unit=joints[0].unit,
         reset_noise=reset_noise,
         limits=tuple(joint.span for joint in joints),
+        approximate_ik=approximate_ik,
         **drive_fields(drives),
     )
 

@@ -478,7 +478,10 @@ class TaskEnv(Remade):
 
     def _info(self, state: State) -> Info:
         judged = self._judged.checked(self.task.evaluate(state))
-        return {ELAPSED: self._elapsed.copy(), **judged}
+        info: Info = {ELAPSED: self._elapsed.copy(), **judged}
+        if (modes := self.simulation.modes) is not None:
+            info |= {f"{arm}.shortfall": rows.copy() for arm, rows in modes.shortfalls.items()}
+        return info
 
     def _observation(self, state: State, info: Info, ids: Sequence[int]) -> Any:
         """Return what is observed of all environments, of which those in ``ids`` have moved."""

@@ -175,7 +175,7 @@ def try_robot(robot: RobotDescriptor, steps: int = 50, seed: int = 0) -> Trial:
     Raises:
         RobotLayoutsError: If it cannot be built.
     """
-    alone = _Alone(single({NAME: robot}))
+    alone = RobotAlone(single({NAME: robot}))
     overlaps = tuple(starting_overlaps(alone.layout, build=alone.build))
     first, after = alone.hold_still()
     fastest, exploded = alone.play(np.random.default_rng(seed), steps)
@@ -208,7 +208,7 @@ def tcp_error(robot: RobotDescriptor) -> float | None:
         RobotLayoutsError: If it cannot be built.
     """
     layout = single({NAME: robot}).in_control_mode("pd_joint_pos")
-    alone = _Alone(layout)
+    alone = RobotAlone(layout)
     start = alone.tcp()
     ways = [sign * TCP_WAY * np.eye(3)[axis] for axis, sign in product(range(3), (1, -1))]
     targets = {str(i): tuple((start + way).tolist()) for i, way in enumerate(ways)}
@@ -237,17 +237,26 @@ def percent(share: float) -> str:
     return f"{share:.0%}" if share < MOST_SHARE else f"more than {MOST_SHARE:.0%}"
 
 
-class _Alone:
-    """A robot alone in a world, at its start."""
+class RobotAlone:
+    """A robot alone in a world, at its start.
+
+    Attributes:
+        layout: The robot.
+        robot: Its descriptor.
+        start: Where its joints start, (dof,) (rad, m).
+        build: What else the world holds.
+        simulation: The world.
+    """
 
     def __init__(self, layout: Layout) -> None:
+        """Stand the robot of a layout in a world."""
         self.layout = layout
         self.robot, self.start = layout[NAME].robot, layout[NAME].start_qpos
         base = layout[NAME].base_position[2]
         self.build = adds_floor(base) if drives_on_floor(self.robot) else empty
-        self._simulation = Simulation(layout, self.build, 1)
-        self._limits = self._simulation.index.robots[NAME].speeds
-        stand(self._simulation)
+        self.simulation = Simulation(layout, self.build, 1)
+        self._limits = self.simulation.index.robots[NAME].speeds
+        stand(self.simulation)
 
     def hold_still(self) -> tuple[Moved, Moved]:
         """Hold it; return what moved most in the first step, and what is fastest in the end."""
@@ -327,13 +336,13 @@ class _Alone:
 
     def step(self, action: Array) -> None:
         """Take a control step, unless nothing is left to be stepped."""
-        positions = self._simulation.read().joint_positions
+        positions = self.simulation.read().joint_positions
         if np.isfinite(positions).all():
-            self._simulation.step(np.asarray(action, np.float32)[None], positions)
+            self.simulation.step(np.asarray(action, np.float32)[None], positions)
 
     def tcp(self) -> Floats:
         """Return where the TCP is, (3,) (m)."""
-        return self._simulation.read().tcp_position(NAME)[0].astype(float)
+        return self.simulation.read().tcp_position(NAME)[0].astype(float)
 
     def _number_at(self, number: ActionNumber, position: float) -> float:
         group = self.robot.action_split.groups[number.group]
@@ -350,7 +359,7 @@ class _Alone:
         """
         if number.relative:
             place = self.robot.joints.index(number.joints[0])
-            low, high = self._simulation.index.robots[NAME].limits[place].tolist()
+            low, high = self.simulation.index.robots[NAME].limits[place].tolist()
             up = high - self.start[place] >= self.start[place] - low
             room = max(high - self.start[place], self.start[place] - low)
             return min(abs(number.upper if up else number.lower), room), 1.0 if up else -1.0
@@ -372,14 +381,14 @@ class _Alone:
 
     def _restart(self) -> None:
         """Stand it at its start again, in a world that knows nothing of what was."""
-        self._simulation.rebuild([0], self.build)
-        stand(self._simulation)
+        self.simulation.rebuild([0], self.build)
+        stand(self.simulation)
 
     def _qpos(self) -> Floats:
-        return self._simulation.read().qpos(NAME)[0].astype(float)
+        return self.simulation.read().qpos(NAME)[0].astype(float)
 
     def _qvel(self) -> Floats:
-        return self._simulation.read().qvel(NAME)[0].astype(float)
+        return self.simulation.read().qvel(NAME)[0].astype(float)
 
     def _most(self, amounts: Floats) -> Moved:
         amounts = np.nan_to_num(amounts, nan=np.inf)

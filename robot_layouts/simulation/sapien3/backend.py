@@ -30,11 +30,7 @@ from robot_layouts.simulation.sapien3.contacts import (
 )
 from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from robot_layouts.simulation.sapien3.kinematics.point_reach import PointReach
-from robot_layouts.simulation.sapien3.kinematics.pose_follower import (
-    JOINTS_OF_A_POSE,
-    NearestFollower,
-    PoseFollower,
-)
+from robot_layouts.simulation.sapien3.kinematics.pose_follower import PoseFollower
 from robot_layouts.simulation.sapien3.varied import vary
 from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
@@ -193,8 +189,7 @@ class SapienBackend:
     ) -> PoseFollower:
         """Return what follows poses of a link; see `Backend`."""
         urdf = self._blueprints[robot].text
-        follower = PoseFollower if len(joints) >= JOINTS_OF_A_POSE else NearestFollower
-        return follower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
+        return PoseFollower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
 
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch; see `Backend`."""
