@@ -37,9 +37,9 @@ class TcpTrial(NamedTuple):
         mode: The control mode.
         drift: How far the TCP went from its start under an action that holds it (m).
         turn_drift: How far it turned (rad).
-        corner: How far it stayed from that corner of a square that it missed most (m).
+        corner: How far it stayed from that corner of a square of which most went unreported (m).
         reported: How far the mode said that it would stay (m); 0 if it reports nothing.
-        turn_reported: By how much it gave up the orientation there (rad).
+        turn_reported: By how much it gave up the orientation in some corner, at most (rad).
     """
 
     arm: str
@@ -130,7 +130,9 @@ class _Square:
                 self._send(here + min(step / _ON_A_SIDE, 1.0) * (there - here))
             corners.append((self._away(there)[0], *self._reported()))
             here = there
-        return max(corners, key=lambda corner: np.nan_to_num(corner[0] - corner[1], nan=np.inf))
+        seen = np.nan_to_num(corners, nan=np.inf)
+        corner, reported, _ = seen[(seen[:, 0] - seen[:, 1]).argmax()].tolist()
+        return corner, reported, float(seen[:, 2].max())
 
     def _send(self, goal: Floats) -> None:
         action = self._still.copy()

@@ -60,7 +60,7 @@ class ApproximateArm:
             Positions of the group's joints, (joints,) (rad, m), and what is missing to the place
             (m) and to the orientation (rad).
         """
-        joints = qpos.astype(float)
+        joints = qpos
         root = self._tree.forward(joints[None])[0, self._root]
         wanted = root @ pose_matrix(pose[:3], pose[3:])
         goal = Goal(wanted[:3, 3], self._links, wanted[:3, :3], self._turned, self._offset)

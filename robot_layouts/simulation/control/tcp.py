@@ -209,17 +209,16 @@ class ToolControl:
 
     def _nearest(self, wanted: Row, state: State, env: int) -> tuple[Joints, tuple[float, float]]:
         """Return the joints that bring the TCP where it is wanted, or nearest; and what misses."""
-        if len(self.tool.group.joints) >= JOINTS_OF_A_POSE:
+        tool, joints = self.tool, state.joint_positions[env].astype(float)
+        if len(tool.group.joints) >= JOINTS_OF_A_POSE:
             found = self._followed(wanted, state, env)
-            present = state.joint_positions[env, self.tool.joints].astype(float)
             if found is not None:
-                found = nearest_turns(found, present, self._limits)
+                found = nearest_turns(found, joints[tool.joints], self._limits)
             if found is not None:
                 return found, (0.0, 0.0)
         if self._arm is None:
-            tool = self.tool
             self._arm = ApproximateArm(tool.body, tool.limb, tool.group)
-        return self._arm.nearest(np.array(wanted), state.joint_positions[env, self.tool.own])
+        return self._arm.nearest(np.array(wanted, float), joints[tool.own])
 
     def _wanted(self, action: Floats, scaled: Floats, state: State, env: int) -> Row:
         """Return where the TCP is to be, in its root link's frame."""
