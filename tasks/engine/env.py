@@ -385,7 +385,7 @@ class TaskEnv(Remade):
         if self.scenario.render_mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
         if self._camera is None:
-            from robot_layouts.simulation.rendering.pictures import Cameras
+            from robot_layouts.simulation.rendering import Cameras
 
             self._camera = Cameras(self.simulation, *self.task.viewpoint)
         return self._camera.take()

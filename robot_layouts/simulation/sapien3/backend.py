@@ -19,6 +19,7 @@ from robot_layouts.simulation.backend import (
     Velocity,
 )
 from robot_layouts.simulation.maths import Flags, Floats
+from robot_layouts.simulation.sapien3.arms import InverseKinematics, PointReach
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
 from robot_layouts.simulation.sapien3.collision import described_shapes
 from robot_layouts.simulation.sapien3.contacts import (
@@ -28,9 +29,7 @@ from robot_layouts.simulation.sapien3.contacts import (
     overlaps_in,
     presses_on_object,
 )
-from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
-from robot_layouts.simulation.sapien3.kinematics.point_reach import PointReach
-from robot_layouts.simulation.sapien3.kinematics.pose_follower import PoseFollower
+from robot_layouts.simulation.sapien3.pose_follower import PoseFollower
 from robot_layouts.simulation.sapien3.varied import vary
 from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
@@ -170,7 +169,7 @@ class SapienBackend:
         self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
     ) -> Callable[[], list[View]]:
         """Begin to draw what cameras see; see `Backend`."""
-        from robot_layouts.simulation.sapien3.pictures.studio import (
+        from robot_layouts.simulation.sapien3.studio import (
             look,  # what draws is loaded by the first picture
         )
 

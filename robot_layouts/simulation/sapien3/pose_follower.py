@@ -1,7 +1,7 @@
 """Which joints bring a link to a pose, by the search with which native's controllers drive.
 
 It is SAPIEN's Pinocchio, on the robot's own URDF and with native's arguments: its results are
-native's to the last bit. `arm_model` beside it takes SAPIEN's model of what was built, whose
+native's to the last bit. `arms` beside it takes SAPIEN's model of what was built, whose
 numbers are rounded.
 """
 
