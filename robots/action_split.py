@@ -10,6 +10,8 @@ from robot_layouts.core.errors import DescriptorError, UnknownNameError, unknown
 from robot_layouts.core.schema import check, check_fields
 from robots.commands import COMMANDS, FRAMES, Command
 
+JOINTS_OF_A_POSE = 6  # that an arm needs to choose place and orientation
+
 
 def names(prefix: str, first: int, last: int) -> tuple[str, ...]:
     """Return ``prefix + str(i)`` for i from ``first`` to ``last``, both included."""
@@ -66,6 +68,9 @@ class JointGroup:
             not to where it is.
         frame: In which frames a ``delta`` of a TCP pose is; see `robots.commands.FRAMES`.
         root_link: Link whose frame TCP poses are in; the robot's root if None.
+        approximate_ik: Whether control of the TCP goes as near to a pose as it gets where it
+            cannot be had: the place first, then the orientation. The default is ManiSkill's way:
+            an arm of six joints or more then stays where it is.
     """
 
     joints: tuple[str, ...]
@@ -91,6 +96,7 @@ class JointGroup:
     root_link: str | None = None
     leaders: tuple[str, ...] = ()
     lead: float = 0.0
+    approximate_ik: bool = False
 
     def __post_init__(self) -> None:
         """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
@@ -225,6 +231,11 @@ class JointGroup:
         if self.held:
             return 0
         return 1 if self.mimic else len(self.numbers)
+
+    @property
+    def approximates(self) -> bool:
+        """Whether the TCP goes as near to a pose as it gets: also if it has too few joints."""
+        return self.approximate_ik or len(self.joints) < JOINTS_OF_A_POSE
 
     @property
     def numbers(self) -> tuple[tuple[str, str], ...]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from layouts import Layout
-from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate, rotation_of
+from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate, xyz_angles
 from robot_layouts.simulation import State
 from robots import JointGroup
 from tasks.engine.env import TaskEnv
@@ -134,7 +134,7 @@ class TcpDrive:
         root = self._root(state)
         place, turn = _seen_from(root, target)
         if not group.delta:
-            return _normalised(group, np.concatenate([place, _angles(turn)]))
+            return _normalised(group, np.concatenate([place, xyz_angles(turn)]))
         if group.target:
             before = _remembered(self._task, self.driven, "target_pose")
             origin, turned = before[:3], before[3:]
@@ -146,7 +146,7 @@ class TcpDrive:
         if not group.asks.turn:
             return _normalised(group, way)
         rest = multiply(turn, back) if turns.startswith("root") else multiply(back, turn)
-        return _normalised(group, np.concatenate([way, _angles(rest)]))
+        return _normalised(group, np.concatenate([way, xyz_angles(rest)]))
 
     def at(self, state: State) -> Floats:
         """See `PositionDrive`."""
@@ -216,15 +216,3 @@ def _seen_from(root: Floats, pose: Floats) -> tuple[Floats, Floats]:
     """Return place and turn of a pose of the world in the frame of another."""
     back = inverse(root[3:])
     return rotate(back, pose[:3] - root[:3]), multiply(back, pose[3:])
-
-
-def _angles(quaternion: Floats) -> Floats:
-    """Return the turns about x, then the turned y, then the turned z (rad), (3,)."""
-    matrix = rotation_of(quaternion)
-    return np.array(
-        [
-            np.arctan2(-matrix[1, 2], matrix[2, 2]),
-            np.arcsin(np.clip(matrix[0, 2], -1, 1)),
-            np.arctan2(-matrix[0, 1], matrix[0, 0]),
-        ]
-    )

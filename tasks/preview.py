@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.writing import written_whole
-from robot_layouts.simulation.rendering.pictures import FIELD_OF_VIEW
+from robot_layouts.simulation.rendering import FIELD_OF_VIEW
 from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
 from robots import MissingPackageError, TaskError, UnknownNameError
 from tasks.engine.cameras import cameras_of, resized

@@ -85,7 +85,7 @@ def renderer() -> object:
     It goes with the last scene that can be drawn, and the next one would compute how light is
     reflected anew: 6 s of processor time.
     """
-    from robot_layouts.simulation.rendering.pictures import vulkan_problem
+    from robot_layouts.simulation.rendering import vulkan_problem
 
     if vulkan_problem():
         return None

@@ -11,8 +11,8 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 import tasks
+from robot_layouts.simulation.sapien3.arms import InverseKinematics
 from robot_layouts.simulation.sapien3.backend import worlds_below
-from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from tasks.episode import Episode
 
 OPEN, CLOSED = 1.0, -1.0

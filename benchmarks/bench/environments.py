@@ -18,7 +18,7 @@ from benchmarks.bench.measurement import Measurement, Sample, Settings, SomeValu
 from benchmarks.bench.worlds import crowd, make_crowd, make_pile
 from parity.native import make_native, native_action
 from robot_layouts.data.recording.recorder import Recorder
-from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.rendering import vulkan_problem
 from tasks import (
     CameraShift,
     Distractors,

@@ -29,7 +29,7 @@ from benchmarks.bench.measurement import (
     measured,
 )
 from parity.native import make_native_front
-from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.rendering import vulkan_problem
 from tasks import get_task_class, list_clones
 
 PROCESSES = 2  # of a vector

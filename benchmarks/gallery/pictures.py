@@ -23,7 +23,7 @@ from robot_layouts.experts import find_expert
 from robot_layouts.kinematics.quaternions import multiplied, normalised, yaw_quaternion
 from robot_layouts.simulation import Camera
 from robot_layouts.simulation.checks.overlaps import empty, stand
-from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.scene.cameras import View
 from robot_layouts.simulation.simulation import Simulation
 from robots import DescriptorError, MissingPackageError, RobotDescriptor, RobotRegistry

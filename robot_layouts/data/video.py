@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.writing import PARTIAL, written_whole
-from robot_layouts.simulation.rendering.pictures import Cameras, vulkan_problem
+from robot_layouts.simulation.rendering import Cameras, vulkan_problem
 from robots import MissingPackageError, RecordingError
 from tasks import TaskEnv
 from tasks.engine.columns import overview

@@ -106,6 +106,22 @@ def rotation_vector(rotation: ArrayLike) -> Floats:
     return axis * np.where(small, series, angle / np.sin(np.where(small, 1.0, angle) / 2))
 
 
+def xyz_angles(quaternion: ArrayLike) -> Floats:
+    """Return the turns about x, then the turned y, then the turned z of a rotation, (3,) (rad).
+
+    Args:
+        quaternion: wxyz, unit length, (4,).
+    """
+    matrix = rotation_of(quaternion)
+    return np.array(
+        [
+            np.arctan2(-matrix[1, 2], matrix[2, 2]),
+            np.arcsin(np.clip(matrix[0, 2], -1, 1)),
+            np.arctan2(-matrix[0, 1], matrix[0, 0]),
+        ]
+    )
+
+
 def pose_matrix(position: ArrayLike, quaternion: ArrayLike) -> Floats:
     """Return poses as matrices, (…, 4, 4).
 

@@ -102,11 +102,21 @@ def solve(
     turned = needed.link(tree.links[goal.turned])
     goal = replace(goal, links=links, turned=turned)
     qpos = _descend(needed, goal, starts.copy(), free, iterations)
-    errors, _ = _errors(needed, goal, qpos, free)
-    missing = np.linalg.norm(errors[:, :3], axis=1)
-    turn_missing = np.linalg.norm(errors[:, 3:], axis=1)
+    missing, turn_missing = shortfalls(needed, goal, qpos)
     solved = (missing < NEAR_ENOUGH[0]) & (turn_missing < NEAR_ENOUGH[1])
     return Solutions(qpos, missing, turn_missing, solved)
+
+
+def shortfalls(tree: Tree, goal: Goal, qpos: Floats) -> tuple[Floats, Floats]:
+    """Return how far the point stays from its place, (n,) (m), and how far from its turn (rad).
+
+    Args:
+        tree: The links.
+        goal: What is asked for.
+        qpos: Coordinates, (n, coordinates) (rad, m).
+    """
+    errors, _ = _errors(tree, goal, qpos, ())
+    return np.linalg.norm(errors[:, :3], axis=1), np.linalg.norm(errors[:, 3:], axis=1)
 
 
 def approach(

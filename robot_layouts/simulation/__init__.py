@@ -9,7 +9,7 @@ from robot_layouts.core.own_packages import expect_own
 expect_own("robots", "layouts")
 
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
-from robot_layouts.simulation.sapien3.plain_scene import build_scene
+from robot_layouts.simulation.sapien3.world import build_scene
 from robot_layouts.simulation.scene.cameras import Camera
 from robot_layouts.simulation.scene.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from robot_layouts.simulation.simulation import Simulation

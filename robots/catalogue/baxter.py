@@ -15,6 +15,7 @@ LEFT_ARM = JointGroup(
     damping=(1310.0, 1050.0, 327.0, 245.0, 31.0, 27.8, 12.7),
     force_limit=(280.0, 224.0, 69.7, 52.2, 15.0, 15.0, 15.0),
     delta=True,
+    approximate_ik=True,
     limits=(
         (-1.70168, 1.70168),
         (-2.147, 1.047),

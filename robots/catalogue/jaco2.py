@@ -15,6 +15,7 @@ ARM = JointGroup(
     damping=(353.0, 454.0, 100.0, 11.1, 11.1, 1.76),
     force_limit=(75.4, 96.9, 40.0, 20.0, 20.0, 20.0),
     delta=True,
+    approximate_ik=True,
     limits=(
         TURNS,
         (0.82030475, 5.4628806),

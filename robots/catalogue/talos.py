@@ -29,6 +29,7 @@ LEFT_ARM = JointGroup(
     damping=(556.0, 409.0, 112.0, 98.7, 10.4, 10.3, 10.2),
     force_limit=(119.0, 87.2, 23.9, 21.1, 3.0, 6.6, 6.6),
     delta=True,
+    approximate_ik=True,
     limits=((-1.5707964, 0.5235988), (0.0, 2.8797932), *LIMITS),
 )
 RIGHT_ARM = replace(

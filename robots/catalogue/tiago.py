@@ -20,6 +20,7 @@ ARM = JointGroup(
     damping=(541.0, 322.0, 60.1, 51.1, 2.42, 2.12, 0.127),
     force_limit=(115.0, 68.7, 17.9, 17.9, 3.0, 6.6, 6.6),
     delta=True,
+    approximate_ik=True,
     limits=(
         (0.0, 2.7488935),
         (-1.5707964, 1.0908308),

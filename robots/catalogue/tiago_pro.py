@@ -38,6 +38,7 @@ LEFT_ARM = JointGroup(
     damping=(343.0, 431.0, 113.0, 106.0, 7.94, 8.06, 1.61),
     force_limit=(73.1, 92.0, 26.0, 26.0, 26.0, 26.0, 26.0),
     delta=True,
+    approximate_ik=True,
     limits=((-0.5235988, 4.712389), BEND, TURN, BEND, (-3.6651914, 1.5707964), WRIST, TURN),
 )
 RIGHT_ARM = replace(

@@ -24,6 +24,7 @@ LEFT_ARM = JointGroup(
     damping=(51.6, 48.5, 12.8, 11.7, 4.35, 4.38, 2.71),
     force_limit=(25.0, 25.0, 25.0, 25.0, 25.0, 5.0, 5.0),
     delta=True,
+    approximate_ik=True,
     limits=(PITCH, (-1.5882, 2.2515), YAW, ELBOW, *WRIST),
 )
 RIGHT_ARM = replace(

@@ -12,6 +12,7 @@ ARM = JointGroup(
     lower=(-0.04, -0.04, -0.1, -0.065, -0.065, -0.1),  # as far as the force brings them
     upper=(0.04, 0.04, 0.1, 0.065, 0.065, 0.1),
     delta=True,
+    approximate_ik=True,
     stiffness=(9.85e4, 8.98e4, 1.93e4, 5670.0, 5700.0, 1000.0),
     damping=(1310.0, 1200.0, 257.0, 75.6, 76.0, 8.28),
     force_limit=(280.0, 255.0, 150.0, 28.0, 28.0, 28.0),  # data sheet 150, 150, 150, 28, 28, 28

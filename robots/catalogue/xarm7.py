@@ -1,5 +1,6 @@
 """UFACTORY xArm 7 without a hand: 7 action numbers."""
 
+from dataclasses import replace
 from math import pi
 
 from robots.assets.locator import UrdfLocator
@@ -29,7 +30,7 @@ ARM = JointGroup(
 XARM7 = RobotDescriptor(
     name="xarm7",
     urdf=UrdfLocator("maniskill_xarm7", "xarm7.urdf"),
-    action_split=ActionSplit(arm=ARM),
+    action_split=ActionSplit(arm=replace(ARM, approximate_ik=True)),
     tcp_link="link_eef",
     keyframes={"rest": (0.0, -0.4, 0.0, 0.5, 0.0, 0.9, -3.0)},
     home=Home(position=(-0.522, 0.0, 0.0)),  # where scene_builder/table stands an xArm 6

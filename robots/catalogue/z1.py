@@ -12,6 +12,7 @@ ARM = JointGroup(
     damping=(236.0, 331.0, 90.4, 16.0, 9.47, 1.99),
     force_limit=(50.4, 70.6, 30.0, 30.0, 30.0, 30.0),
     delta=True,
+    approximate_ik=True,
     limits=(
         (-2.6179938, 2.6179938),
         (0.0, 2.9670596),

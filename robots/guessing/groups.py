@@ -21,8 +21,8 @@ def arm_groups(limb: Limb, drives: Drives) -> dict[str, JointGroup]:
         name_of(limb, name): by_steps(
             joints,
             [drives.of(joint) for joint in joints],
-            reset_noise=joints[0].unit
-            == "rad",  # noise is the same number for all: 2 cm of a slide
+            reset_noise=joints[0].unit == "rad",  # the same noise for all would be 2 cm of a slide
+            approximate_ik=True,
         )
         for name, joints in _by_unit("arm", limb.arm)
     }
@@ -48,7 +48,11 @@ def held_groups(anatomy: Anatomy, drives: Drives) -> dict[str, JointGroup]:
 
 
 def by_steps(
-    joints: Sequence[ModelJoint], drives: Sequence[Drive], *, reset_noise: bool = True
+    joints: Sequence[ModelJoint],
+    drives: Sequence[Drive],
+    *,
+    reset_noise: bool = True,
+    approximate_ik: bool = False,
 ) -> JointGroup:
     """Return a group whose numbers move its joints by steps.
 
@@ -56,6 +60,7 @@ def by_steps(
         joints: Its joints.
         drives: Their drives.
         reset_noise: Whether a reset adds joint noise.
+        approximate_ik: See `robots.JointGroup`.
     """
     steps = [drive.step for drive in drives]
     return JointGroup(
@@ -66,6 +71,7 @@ def by_steps(
         unit=joints[0].unit,
         reset_noise=reset_noise,
         limits=tuple(joint.span for joint in joints),
+        approximate_ik=approximate_ik,
         **drive_fields(drives),
     )
 

@@ -137,7 +137,7 @@ class ColumnObserver:
             raise NotFinite
         observed: dict[str, Any] = {name: column.copy() for name, column in columns.items()}
         if self._mode == FILMED:
-            from robot_layouts.simulation.rendering.pictures import (
+            from robot_layouts.simulation.rendering import (
                 Cameras,  # loaded with the first picture
             )
 

@@ -385,7 +385,7 @@ class TaskEnv(Remade):
         if self.scenario.render_mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
         if self._camera is None:
-            from robot_layouts.simulation.rendering.pictures import Cameras
+            from robot_layouts.simulation.rendering import Cameras
 
             self._camera = Cameras(self.simulation, *self.task.viewpoint)
         return self._camera.take()
@@ -478,7 +478,10 @@ class TaskEnv(Remade):
 
     def _info(self, state: State) -> Info:
         judged = self._judged.checked(self.task.evaluate(state))
-        return {ELAPSED: self._elapsed.copy(), **judged}
+        info: Info = {ELAPSED: self._elapsed.copy(), **judged}
+        if (modes := self.simulation.modes) is not None:
+            info |= {f"{arm}.shortfall": rows.copy() for arm, rows in modes.shortfalls.items()}
+        return info
 
     def _observation(self, state: State, info: Info, ids: Sequence[int]) -> Any:
         """Return what is observed of all environments, of which those in ``ids`` have moved."""

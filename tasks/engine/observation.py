@@ -32,7 +32,7 @@ from tasks.native.format import observation_keys
 from tasks.varying.noise import Noisy
 
 if TYPE_CHECKING:
-    from robot_layouts.simulation.rendering.pictures import Observers, View
+    from robot_layouts.simulation.rendering import Observers, View
 
 PLAIN_MODES = ("state", "state_dict", "none", *COLUMN_MODES)
 SHORT_MODES = {"rgbd": "rgb+depth"}
@@ -332,7 +332,7 @@ class _CameraRig:
         cameras: Mapping[str, AnyCamera],
         textures: Sequence[str],
     ) -> None:
-        from robot_layouts.simulation.rendering.pictures import (
+        from robot_layouts.simulation.rendering import (
             Observers,  # loaded with the first picture
         )
 

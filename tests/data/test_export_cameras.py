@@ -25,7 +25,7 @@ from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.simulation import Camera
-from robot_layouts.simulation.rendering.pictures import Observers, vulkan_problem
+from robot_layouts.simulation.rendering import Observers, vulkan_problem
 from robots import TaskError, UnknownNameError
 from tasks import Normal, Randomization, Shift, Uniform, Whole
 from tasks.episode import play

@@ -14,7 +14,7 @@ from robot_layouts.data.export.pictures import Drawing
 from robot_layouts.data.export.shots import choose_shots
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.rendering import vulkan_problem
 from robots import TaskError
 from tests.data.recordings import SECOND, TWO_ROBOTS, record
 

@@ -11,7 +11,7 @@ from robot_layouts.data import record
 from robot_layouts.data.playing.replay import replay, task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.record import FILE
-from robot_layouts.simulation.rendering.pictures import Observers
+from robot_layouts.simulation.rendering import Observers
 from tasks import (
     CameraShift,
     Distractors,

@@ -10,8 +10,8 @@ from robot_layouts.motion import NoPlanError, TcpGoal, plan
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.model.obstacles import box
-from robot_layouts.motion.planning.goal_configurations import choices, find_goal_configurations
 from robot_layouts.motion.planning.goals import Target, read_targets
+from robot_layouts.motion.planning.query import choices, find_goal_configurations
 from tests.motion.two_pandas import aside, cell, in_the_middle
 
 HARD = TcpGoal((-0.465, -0.112, 0.763), (0.46803, 0.79404, 0.09321, 0.37802))

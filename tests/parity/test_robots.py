@@ -10,7 +10,7 @@ import sapien
 
 from layouts import Layout, Placement
 from robot_layouts.simulation import PhysicsSettings, Simulation
-from robot_layouts.simulation.checks.floor import adds_floor
+from robot_layouts.simulation.checks.trial import adds_floor
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import CONTROL_MODES, RobotDescriptor, RobotRegistry
 from tests.native import NATIVE

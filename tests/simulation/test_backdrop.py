@@ -8,9 +8,9 @@ import pytest
 import tasks
 from layouts import single
 from robot_layouts.simulation import Box, Camera, Simulation, World
-from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backend import worlds_below
-from robot_layouts.simulation.sapien3.pictures.studio import Studio
+from robot_layouts.simulation.sapien3.studio import Studio
 from robot_layouts.simulation.scene.cameras import TEXTURES
 from tests.quick import quick_cases
 

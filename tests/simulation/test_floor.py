@@ -11,9 +11,8 @@ import pytest
 from layouts import single
 from robot_layouts.core.errors import UnknownNameError
 from robot_layouts.simulation import Simulation
-from robot_layouts.simulation.checks.floor import adds_floor, drives_on_floor
 from robot_layouts.simulation.checks.overlaps import stand
-from robot_layouts.simulation.checks.trial import try_robot
+from robot_layouts.simulation.checks.trial import adds_floor, drives_on_floor, try_robot
 from robots import ActionSplit, JointGroup, LocalUrdf, RobotDescriptor, RobotRegistry
 from robots.from_urdf import guess_descriptor
 from tests.faults.toy_robots import joint, link

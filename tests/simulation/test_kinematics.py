@@ -7,7 +7,7 @@ import pytest
 import sapien
 
 from layouts import Layout, Placement
-from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
+from robot_layouts.simulation.sapien3.arms import InverseKinematics
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotRegistry, SimulationError, UnknownNameError
 from tests.catalogue import QUICK

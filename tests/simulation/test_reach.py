@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
-from robot_layouts.simulation.sapien3.kinematics.point_reach import PointReach
+from robot_layouts.simulation.sapien3.arms import PointReach
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotRegistry, UnknownNameError
 from tests.catalogue import QUICK

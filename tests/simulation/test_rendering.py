@@ -10,8 +10,8 @@ import sapien
 import torch
 
 import tasks
-from robot_layouts.simulation.rendering.pictures import Cameras, vulkan_problem
-from robot_layouts.simulation.sapien3.pictures.studio import look_at
+from robot_layouts.simulation.rendering import Cameras, vulkan_problem
+from robot_layouts.simulation.sapien3.studio import look_at
 from robots import SimulationError, TaskError
 
 TASK = "TwoRobotPickCube-v1"
@@ -141,7 +141,7 @@ def test_without_a_driver_every_task_runs_and_one_is_told_why_there_are_no_pictu
         "    for _ in range(3):\n"
         "        obs, *_ = task.step(torch.zeros(1, task.layout.action_dim))\n"
         "    print(name, bool(obs.isfinite().all()))\n"
-        "from robot_layouts.simulation.rendering.pictures import vulkan_problem\n"
+        "from robot_layouts.simulation.rendering import vulkan_problem\n"
         "print(vulkan_problem())\n"
         "tasks.make('PickCube-v1', render_mode='rgb_array')\n"
     )

@@ -6,8 +6,7 @@ import sapien
 import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
-from robot_layouts.simulation.sapien3.plain_scene import build_scene
-from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.sapien3.world import BuiltWorld, build_scene
 from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions
 

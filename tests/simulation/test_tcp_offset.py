@@ -14,7 +14,7 @@ from robot_layouts.kinematics.rotations import rotate
 from robot_layouts.simulation import Simulation
 from robot_layouts.simulation.checks.overlaps import empty, stand
 from robot_layouts.simulation.checks.trial import tcp_error
-from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
+from robot_layouts.simulation.sapien3.arms import InverseKinematics
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.state import with_means
 from robots import DescriptorError, RobotRegistry

@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 
 import tasks
 from robot_layouts.simulation import Camera
-from robot_layouts.simulation.rendering.pictures import Observers, vulkan_problem
+from robot_layouts.simulation.rendering import Observers, vulkan_problem
 from robots import SimulationError, TaskError
 from tests.fresh_process import in_fresh_process
 from tests.simulation.test_rendering import run_without_driver
@@ -41,7 +41,7 @@ def test_states_need_nothing_that_draws():
         "for mode in ('state', 'state_dict', 'none'):\n"
         "    tasks.make('PickCube-v1', obs_mode=mode).reset(seed=0)\n"
         "room = 'robot_layouts.simulation'\n"
-        "drawing = (f'{room}.rendering.pictures', f'{room}.sapien3.visuals')\n"
+        "drawing = (f'{room}.rendering', f'{room}.sapien3.visuals')\n"
         "print([m for m in drawing if m in sys.modules])\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

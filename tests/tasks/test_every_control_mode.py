@@ -29,7 +29,6 @@ from tasks.registry import make_scenario
 from tests.motions import touching_episode
 from tests.native import NATIVE, complaints, pair
 from tests.quick import quick_cases
-from tests.squares import farthest_off
 
 OTHERS = CONTROL_MODES[2:]
 SAMPLE = (
@@ -273,14 +272,6 @@ def test_a_tcp_goes_where_it_is_sent(robot):
         action[0, :3] = np.clip([*(turn.T @ way[:2]), way[2]], -0.02, 0.02) / 0.1
         simulation.step(action, state.joint_positions)
     assert np.abs(goal - simulation.read().tcp_position("arm")[0]).max() < 5e-4
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("mode", ["pd_ee_pose", "pd_ee_delta_pos"])
-def test_a_robot_from_a_urdf_goes_along_a_square(mode):
-    urdf = RobotRegistry.load("xarm7_ability").urdf.locate()
-    robot = RobotDescriptor.from_urdf(urdf, "mine", quiet=True)
-    assert farthest_off(robot, mode) < 2e-3
 
 
 def test_a_robot_from_a_urdf_has_every_mode():

@@ -11,7 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import tasks
-from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.rendering import vulkan_problem
 from robots import TaskError, UnknownNameError
 from tasks import fronts
 from tasks.fronts.gymnasium import GymnasiumTask

@@ -9,7 +9,7 @@ import pytest
 
 import tasks
 from robot_layouts.experts import find_expert
-from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.rendering import vulkan_problem
 from robots import (
     ActionError,
     MissingPackageError,

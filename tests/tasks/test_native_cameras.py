@@ -104,7 +104,7 @@ def test_another_camera_is_noticed(pick: Look, mutant: Camera, part: str):
 
 @pytest.mark.parametrize("what", ["light", "markers", "colour", "privileged"])
 def test_another_scene_is_noticed(pick: Look, what: str, monkeypatch: pytest.MonkeyPatch):
-    from robot_layouts.simulation.sapien3.pictures import studio as rendering
+    from robot_layouts.simulation.sapien3 import studio as rendering
 
     part = "sensor_data/base_camera/rgb"
     if what == "light":
@@ -145,7 +145,7 @@ def test_a_camera_is_turned_as_native_turns_it():
     with quiet():
         import mani_skill.envs  # noqa: F401
         from mani_skill.utils.sapien_utils import look_at as natively
-    from robot_layouts.simulation.sapien3.pictures.studio import look_at
+    from robot_layouts.simulation.sapien3.studio import look_at
 
     for eye, target in np.random.default_rng(0).uniform(-1, 1, (500, 2, 3)).round(2).tolist():
         theirs, ours = natively(eye, target).sp, look_at(tuple(eye), tuple(target))

@@ -20,7 +20,7 @@ import pytest
 
 import tasks
 from benchmarks.soak import read_level
-from robot_layouts.simulation.rendering.pictures import vulkan_problem
+from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import RobotLayoutsError, SimulationError, TaskError
 from tasks.fronts.vector import VectorTask

@@ -7,8 +7,8 @@ import tasks
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.geometry import gripper_facing
 from robot_layouts.experts.script import Scene
+from robot_layouts.simulation.sapien3.arms import InverseKinematics
 from robot_layouts.simulation.sapien3.backend import worlds_below
-from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
 from robots import TaskError
 from tests.tasks.own import look, make, put
 

@@ -283,7 +283,7 @@ def test_wrong_reset_options(options, message):
 
 @pytest.mark.long
 def test_pictures():
-    from robot_layouts.simulation.rendering.pictures import vulkan_problem
+    from robot_layouts.simulation.rendering import vulkan_problem
 
     if problem := vulkan_problem():
         pytest.skip(problem)

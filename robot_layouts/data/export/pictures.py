@@ -12,7 +12,7 @@ from robot_layouts.data.export.shots import RGB, Channel, Frame, Picture, Shots
 from robot_layouts.data.reading.recording import TrajectoryError
 from robot_layouts.data.video import INSTALL
 from robot_layouts.simulation import Simulation
-from robot_layouts.simulation.rendering.pictures import SIZE, Cameras, Observers, vulkan_problem
+from robot_layouts.simulation.rendering import SIZE, Cameras, Observers, vulkan_problem
 from robots import MissingPackageError, SimulationError
 from tasks import TaskEnv
 from tasks.engine.columns import OVERVIEW

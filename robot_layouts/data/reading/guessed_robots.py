@@ -26,6 +26,7 @@ from robots.urdf.summary import MAX_URDF_BYTES
 
 # Fields that digests of 0.2.0 lack, with their defaults.
 NEWER_FIELDS = {"no_floor_contact": (), "native_agent": NativeAgent()}
+_NEWER_IN_GROUPS = ", approximate_ik=False"  # as it is written in a joint group
 
 
 class _Guessed(TypedDict):
@@ -117,7 +118,7 @@ def _checksum(path: Path) -> str:
 def descriptor_digest(robot: RobotDescriptor) -> str:
     """Return a SHA-256, in hex, over all fields of a descriptor but where its files are.
 
-    `NEWER_FIELDS` count where they differ from their defaults, so that older digests stay.
+    Newer fields count where they differ from their defaults, so that older digests stay.
     """
     counted = [f.name for f in fields(robot) if f.compare and f.name != "urdf"]
     values = {name: getattr(robot, name) for name in counted}
@@ -125,4 +126,5 @@ def descriptor_digest(robot: RobotDescriptor) -> str:
         if values[name] == default:
             del values[name]
     values["keyframes"] = dict(robot.keyframes)
-    return hashlib.sha256(repr(values).encode()).hexdigest()
+    written = repr(values).replace(_NEWER_IN_GROUPS, "")
+    return hashlib.sha256(written.encode()).hexdigest()

@@ -5,20 +5,24 @@ A robot whose base drives stands on a floor.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import product, takewhile
 from typing import NamedTuple
 
 import numpy as np
 
 from layouts import Layout, single
 from robot_layouts.simulation.backend import Overlap, Part
-from robot_layouts.simulation.checks.floor import FLOOR, adds_floor, drives_on_floor
 from robot_layouts.simulation.checks.overlaps import empty, stand, starting_overlaps
 from robot_layouts.simulation.maths import Array, Floats
+from robot_layouts.simulation.scene.shapes import Plane
 from robot_layouts.simulation.simulation import Simulation
+from robot_layouts.simulation.world import World
 from robots import ActionNumber, RobotDescriptor
+from robots.urdf.model import ModelJoint, UrdfModel
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
 
 NAME = "robot"  # its name in the layout
 
@@ -175,7 +179,7 @@ def try_robot(robot: RobotDescriptor, steps: int = 50, seed: int = 0) -> Trial:
     Raises:
         RobotLayoutsError: If it cannot be built.
     """
-    alone = _Alone(single({NAME: robot}))
+    alone = RobotAlone(single({NAME: robot}))
     overlaps = tuple(starting_overlaps(alone.layout, build=alone.build))
     first, after = alone.hold_still()
     fastest, exploded = alone.play(np.random.default_rng(seed), steps)
@@ -208,7 +212,7 @@ def tcp_error(robot: RobotDescriptor) -> float | None:
         RobotLayoutsError: If it cannot be built.
     """
     layout = single({NAME: robot}).in_control_mode("pd_joint_pos")
-    alone = _Alone(layout)
+    alone = RobotAlone(layout)
     start = alone.tcp()
     ways = [sign * TCP_WAY * np.eye(3)[axis] for axis, sign in product(range(3), (1, -1))]
     targets = {str(i): tuple((start + way).tolist()) for i, way in enumerate(ways)}
@@ -237,17 +241,26 @@ def percent(share: float) -> str:
     return f"{share:.0%}" if share < MOST_SHARE else f"more than {MOST_SHARE:.0%}"
 
 
-class _Alone:
-    """A robot alone in a world, at its start."""
+class RobotAlone:
+    """A robot alone in a world, at its start.
+
+    Attributes:
+        layout: The robot.
+        robot: Its descriptor.
+        start: Where its joints start, (dof,) (rad, m).
+        build: What else the world holds.
+        simulation: The world.
+    """
 
     def __init__(self, layout: Layout) -> None:
+        """Stand the robot of a layout in a world."""
         self.layout = layout
         self.robot, self.start = layout[NAME].robot, layout[NAME].start_qpos
         base = layout[NAME].base_position[2]
         self.build = adds_floor(base) if drives_on_floor(self.robot) else empty
-        self._simulation = Simulation(layout, self.build, 1)
-        self._limits = self._simulation.index.robots[NAME].speeds
-        stand(self._simulation)
+        self.simulation = Simulation(layout, self.build, 1)
+        self._limits = self.simulation.index.robots[NAME].speeds
+        stand(self.simulation)
 
     def hold_still(self) -> tuple[Moved, Moved]:
         """Hold it; return what moved most in the first step, and what is fastest in the end."""
@@ -327,13 +340,13 @@ class _Alone:
 
     def step(self, action: Array) -> None:
         """Take a control step, unless nothing is left to be stepped."""
-        positions = self._simulation.read().joint_positions
+        positions = self.simulation.read().joint_positions
         if np.isfinite(positions).all():
-            self._simulation.step(np.asarray(action, np.float32)[None], positions)
+            self.simulation.step(np.asarray(action, np.float32)[None], positions)
 
     def tcp(self) -> Floats:
         """Return where the TCP is, (3,) (m)."""
-        return self._simulation.read().tcp_position(NAME)[0].astype(float)
+        return self.simulation.read().tcp_position(NAME)[0].astype(float)
 
     def _number_at(self, number: ActionNumber, position: float) -> float:
         group = self.robot.action_split.groups[number.group]
@@ -350,7 +363,7 @@ class _Alone:
         """
         if number.relative:
             place = self.robot.joints.index(number.joints[0])
-            low, high = self._simulation.index.robots[NAME].limits[place].tolist()
+            low, high = self.simulation.index.robots[NAME].limits[place].tolist()
             up = high - self.start[place] >= self.start[place] - low
             room = max(high - self.start[place], self.start[place] - low)
             return min(abs(number.upper if up else number.lower), room), 1.0 if up else -1.0
@@ -372,14 +385,14 @@ class _Alone:
 
     def _restart(self) -> None:
         """Stand it at its start again, in a world that knows nothing of what was."""
-        self._simulation.rebuild([0], self.build)
-        stand(self._simulation)
+        self.simulation.rebuild([0], self.build)
+        stand(self.simulation)
 
     def _qpos(self) -> Floats:
-        return self._simulation.read().qpos(NAME)[0].astype(float)
+        return self.simulation.read().qpos(NAME)[0].astype(float)
 
     def _qvel(self) -> Floats:
-        return self._simulation.read().qvel(NAME)[0].astype(float)
+        return self.simulation.read().qvel(NAME)[0].astype(float)
 
     def _most(self, amounts: Floats) -> Moved:
         amounts = np.nan_to_num(amounts, nan=np.inf)
@@ -391,3 +404,50 @@ class _Alone:
         place = int((speeds / self._limits).argmax())
         limit = float(self._limits[place])
         return Fastest(self.robot.joints[place], float(speeds[place]), limit, step)
+
+
+FLOOR = "floor"  # its name in a world
+UPWARD = (0.7071068, 0.0, -0.7071068, 0.0)  # a plane's normal, +x, turned to +z
+LEVEL = 1e-3  # a slide rises by less per m; a turn's axis leans by less (sine)
+
+
+def drives_on_floor(robot: RobotDescriptor) -> bool:
+    """Tell whether a robot's first joints move all of it on a level floor, and turn it there.
+
+    Raises:
+        AssetError: If its URDF cannot be found.
+    """
+    urdf = robot.urdf.locate()
+    model = read_model(read_urdf(urdf), urdf.as_posix())
+    base = takewhile(lambda joint: _level(joint, model), _base_joints(model))
+    return {joint.unit for joint in base} == {"m", "rad"}
+
+
+def adds_floor(height: float) -> Callable[[World, int], None]:
+    """Return what adds a floor to a world, at a height (m)."""
+    plane = Plane(position=(0.0, 0.0, height), quaternion=UPWARD)
+
+    def build(world: World, number: int) -> None:
+        world.add(FLOOR, plane, kind="static")
+
+    return build
+
+
+def _base_joints(model: UrdfModel) -> Iterator[ModelJoint]:
+    """Yield the joints that carry all that collides, from the root on."""
+    link = model.root
+    while not any(near in model.collisions for near in model.rigid_with(link)):
+        joints = model.moving_on(link)
+        if len(joints) != 1:
+            return
+        yield joints[0]
+        link = joints[0].child
+
+
+def _level(joint: ModelJoint, model: UrdfModel) -> bool:
+    """Tell whether a joint leaves the robot on the floor, where the joints before it are at 0."""
+    turn = np.eye(3)
+    for before in model.path_to(joint.child):
+        turn = turn @ before.origin[:3, :3]
+    x, y, z = turn @ joint.axis
+    return bool(abs(z) < LEVEL) if joint.unit == "m" else bool(np.hypot(x, y) < LEVEL)

@@ -108,7 +108,7 @@ class ModeController:
             self.targets = state.joint_positions.copy()
         self.targets[env_ids] = state.joint_positions[env_ids]
         for control in self._tools.values():
-            if control.tool.group.target:
+            if control.tool.group.target or control.tool.group.approximates:
                 control.begin(state, env_ids)
 
     def command(
@@ -144,6 +144,18 @@ class ModeController:
             velocities[:, joint + 1] = sin(heading) * forward
             velocities[:, joint + 2] = scaled[:, number + 1]
         return targets, velocities
+
+    @property
+    def shortfalls(self) -> dict[str, Floats]:
+        """By arm, how far the last step's joints stay from where it was sent, (N, 2) (m, rad).
+
+        Of arms alone that go as near as they get where a pose cannot be had.
+        """
+        return {
+            control.tool.arm: control.shortfalls
+            for control in self._tools.values()
+            if control.tool.group.approximates
+        }
 
     def recall(self) -> list[Floats]:
         """Return the numbers of `remembered`, each (N, size) (rad, m, wxyz)."""
@@ -209,6 +221,6 @@ def _velocities(driven: Sequence[_Driven]) -> tuple[NDArray[np.intp], NDArray[np
 
 
 def _tool(part: _Driven, layout: Layout, arm: str) -> Tool:
-    link = layout.arm(arm).robot.tcp_link
+    body, limb = layout[part.robot].robot, layout.arm(arm).robot
     joints = slice(part.joints.start, part.joints.stop)
-    return Tool(part.robot, arm, part.group, link, part.numbers, joints, part.own)
+    return Tool(part.robot, arm, part.group, body, limb, part.numbers, joints, part.own)

@@ -8,11 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from robot_layouts.kinematics.quaternions import inverted, multiplied
-from robot_layouts.simulation.backend import Backend, PoseFollower
+from robot_layouts.simulation.backend import Backend, Joints, PoseFollower
+from robot_layouts.simulation.control.approximate import ApproximateArm, nearest_turns
 from robot_layouts.simulation.maths import Floats, cos, norm, sin, sqrt
 from robot_layouts.simulation.readout import ReadoutIndex
 from robot_layouts.simulation.state import State
-from robots import JointGroup
+from robots import JointGroup, RobotDescriptor
+from robots.action_split import JOINTS_OF_A_POSE
 
 Number = np.float32
 Row = tuple[Number, ...]
@@ -108,7 +110,8 @@ class Tool(NamedTuple):
         robot: Name of the robot in the layout.
         arm: Name of the robot or the limb whose TCP it is.
         group: What drives it.
-        tcp_link: Link that orients the TCP.
+        body: The robot.
+        limb: The robot, or its limb.
         numbers: Where its action numbers are in the flat action.
         joints: Where its joints are among those of all robots.
         own: Where the robot's joints are among those of all robots.
@@ -117,7 +120,8 @@ class Tool(NamedTuple):
     robot: str
     arm: str
     group: JointGroup
-    tcp_link: str
+    body: RobotDescriptor
+    limb: RobotDescriptor
     numbers: slice
     joints: slice
     own: slice
@@ -129,6 +133,8 @@ class ToolControl:
     Attributes:
         tool: The joint group.
         targets: Where the TCP was last asked to be in its root link's frame, (N, 7).
+        shortfalls: By how much the joints of the last step miss what it asked for, if the group
+            approximates: place (m) and orientation (rad), (N, 2).
     """
 
     def __init__(self, tool: Tool) -> None:
@@ -141,31 +147,39 @@ class ToolControl:
         # Native scales a turn by its lower bound, so that 1 turns backwards.
         self._turn_scale = np.float32(group.ranges[-1][0])
         self._follower: PoseFollower | None = None
+        self._arm: ApproximateArm | None = None
+        self._limits: Floats = np.zeros((0, 2), np.float32)
         self._tcp_frame = self._link_frame = self._root_frame = 0
         self._roots: dict[bytes, Row] = {}
         self.targets: Floats = np.zeros((0, 7), np.float32)
+        self.shortfalls: Floats = np.zeros((0, 2), np.float32)
 
     def build(self, backend: Backend, index: ReadoutIndex) -> None:
         """Find the frames, and what solves for joints."""
         tool, links = self.tool, index.links[self.tool.robot]
         root_link = tool.group.root_link
-        self._tcp_frame, self._link_frame = index.tcps[tool.arm], links[tool.tcp_link]
+        self._tcp_frame, self._link_frame = index.tcps[tool.arm], links[tool.limb.tcp_link]
         self._root_frame = index.bases[tool.robot] if root_link is None else links[root_link]
         self._follower = backend.pose_follower(
-            tool.robot, tool.tcp_link, root_link, tool.group.joints
+            tool.robot, tool.limb.tcp_link, root_link, tool.group.joints
         )
+        own = slice(tool.joints.start - tool.own.start, tool.joints.stop - tool.own.start)
+        self._limits = index.robots[tool.robot].limits[own]
 
     def begin(self, state: State, env_ids: Iterable[int]) -> None:
-        """Let the targets of some worlds be where the TCPs are."""
+        """Let the targets of some worlds be where the TCPs are, which miss nothing."""
         if len(self.targets) != state.num_envs:
             self.targets = np.zeros((state.num_envs, 7), np.float32)
+            self.shortfalls = np.zeros((state.num_envs, 2), np.float32)
         for env in env_ids:
             self.targets[env] = self._now(state, env)
+            self.shortfalls[env] = 0.0
 
     def drive(self, action: Floats, scaled: Floats, state: State, env: int, joints: Floats) -> None:
         """Write the joint targets that bring the TCP where an action asks it to be.
 
-        They are left as they are if there are none.
+        If there are none they are left as they are, or go as near as they get if the group
+        approximates.
 
         Args:
             action: Of one world, (A,).
@@ -174,17 +188,37 @@ class ToolControl:
             env: Which world.
             joints: Joint targets of that world, (dof,) (rad, m), which hold the present joints.
         """
-        assert self._follower is not None
         wanted = self._wanted(action, scaled, state, env)
         if self.tool.group.target:
             self.targets[env] = wanted
-        pose: Floats = np.array(self._of_link(wanted, state, env), np.float32)
-        qpos = state.joint_positions[env, self.tool.own]
-        found = self._follower.follow(pose[:3], pose[3:], qpos)
+        if self.tool.group.approximates:
+            found, self.shortfalls[env] = self._nearest(wanted, state, env)
+        else:
+            found = self._followed(wanted, state, env)
         if found is not None:
             joints[self.tool.joints] = found
 
     # -- inside ------------------------------------------------------------------------------
+
+    def _followed(self, wanted: Row, state: State, env: int) -> Joints | None:
+        """Return the joints that ManiSkill's search finds, or None."""
+        assert self._follower is not None
+        pose: Floats = np.array(self._of_link(wanted, state, env), np.float32)
+        qpos = state.joint_positions[env, self.tool.own]
+        return self._follower.follow(pose[:3], pose[3:], qpos)
+
+    def _nearest(self, wanted: Row, state: State, env: int) -> tuple[Joints, tuple[float, float]]:
+        """Return the joints that bring the TCP where it is wanted, or nearest; and what misses."""
+        tool, joints = self.tool, state.joint_positions[env].astype(float)
+        if len(tool.group.joints) >= JOINTS_OF_A_POSE:
+            found = self._followed(wanted, state, env)
+            if found is not None:
+                found = nearest_turns(found, joints[tool.joints], self._limits)
+            if found is not None:
+                return found, (0.0, 0.0)
+        if self._arm is None:
+            self._arm = ApproximateArm(tool.body, tool.limb, tool.group)
+        return self._arm.nearest(np.array(wanted, float), joints[tool.own])
 
     def _wanted(self, action: Floats, scaled: Floats, state: State, env: int) -> Row:
         """Return where the TCP is to be, in its root link's frame."""

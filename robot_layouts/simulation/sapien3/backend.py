@@ -19,6 +19,7 @@ from robot_layouts.simulation.backend import (
     Velocity,
 )
 from robot_layouts.simulation.maths import Flags, Floats
+from robot_layouts.simulation.sapien3.arms import InverseKinematics, PointReach
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
 from robot_layouts.simulation.sapien3.collision import described_shapes
 from robot_layouts.simulation.sapien3.contacts import (
@@ -28,13 +29,7 @@ from robot_layouts.simulation.sapien3.contacts import (
     overlaps_in,
     presses_on_object,
 )
-from robot_layouts.simulation.sapien3.kinematics.inverse_kinematics import InverseKinematics
-from robot_layouts.simulation.sapien3.kinematics.point_reach import PointReach
-from robot_layouts.simulation.sapien3.kinematics.pose_follower import (
-    JOINTS_OF_A_POSE,
-    NearestFollower,
-    PoseFollower,
-)
+from robot_layouts.simulation.sapien3.pose_follower import PoseFollower
 from robot_layouts.simulation.sapien3.varied import vary
 from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
@@ -174,7 +169,7 @@ class SapienBackend:
         self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
     ) -> Callable[[], list[View]]:
         """Begin to draw what cameras see; see `Backend`."""
-        from robot_layouts.simulation.sapien3.pictures.studio import (
+        from robot_layouts.simulation.sapien3.studio import (
             look,  # what draws is loaded by the first picture
         )
 
@@ -193,8 +188,7 @@ class SapienBackend:
     ) -> PoseFollower:
         """Return what follows poses of a link; see `Backend`."""
         urdf = self._blueprints[robot].text
-        follower = PoseFollower if len(joints) >= JOINTS_OF_A_POSE else NearestFollower
-        return follower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
+        return PoseFollower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
 
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch; see `Backend`."""

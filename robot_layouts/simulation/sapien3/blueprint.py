@@ -7,9 +7,10 @@ model has let through, and what it built is compared with that model.
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,9 +20,8 @@ import sapien.physx as physx
 from sapien.wrapper.urdf_loader import URDFLoader
 
 from robot_layouts.simulation.sapien3.collision_groups import NO_FLOOR_CONTACT, USUAL, overlap_words
-from robot_layouts.simulation.sapien3.mirrored import unmirrored
 from robots import AssetError, RobotDescriptor, UnknownNameError
-from robots.urdf.mesh_files import has_body, load_scene
+from robots.urdf.mesh_files import has_body, load_scene, read_corners
 from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
@@ -295,3 +295,38 @@ def _cannot_cook(shape: UrdfShape, urdf: Path) -> bool:
     except RuntimeError:
         return True
     return False
+
+
+def unmirrored(path: str, scale: tuple[float, ...], where: str, urdf: str) -> str:
+    """Return a mesh file that needs no scale, whose convex hull is that of another one scaled.
+
+    PhysX knows no convex bodies of negative scale: it builds them, and the process crashes where
+    two of them touch.
+
+    Args:
+        path: A mesh file.
+        scale: Its factors along x, y and z, some of them negative.
+        where: What refers to it, for messages.
+        urdf: The URDF that it belongs to.
+
+    Raises:
+        AssetError: If it cannot be read.
+    """
+    return _written(path, Path(path).stat().st_mtime_ns, scale, where, urdf)
+
+
+@lru_cache(maxsize=1024)
+def _written(path: str, _modified: int, scale: tuple[float, ...], where: str, urdf: str) -> str:
+    import trimesh
+
+    hull: Any = trimesh.convex.convex_hull(read_corners(path, scale, where, urdf))
+    folder = Path(_folder().name)
+    target = folder / f"{len(list(folder.iterdir()))}_{Path(path).stem}.stl"
+    hull.export(target)
+    return str(target)
+
+
+@cache
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder that is removed when this process ends."""
+    return tempfile.TemporaryDirectory(prefix="robot-layouts-")

@@ -1,7 +1,7 @@
 """Which joints bring a link to a pose, by the search with which native's controllers drive.
 
 It is SAPIEN's Pinocchio, on the robot's own URDF and with native's arguments: its results are
-native's to the last bit. `arm_model` beside it takes SAPIEN's model of what was built, whose
+native's to the last bit. `arms` beside it takes SAPIEN's model of what was built, whose
 numbers are rounded.
 """
 
@@ -16,20 +16,12 @@ import sapien
 from numpy.typing import NDArray
 from sapien.wrapper.pinocchio_model import PinocchioModel
 
-from robot_layouts.kinematics.rotations import rotation_of, rotation_vector
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.sapien3.robot import SimulatedRobot
 from robots import DescriptorError, UnknownNameError
 
 _MAX_ITERATIONS = 100  # mani_skill 3.0.1, agents/controllers/utils/kinematics.py
-_MOST_DESCENTS = 30
-_LONGEST_STEP, _SETTLED = 0.3, 1e-4  # of a joint, per descent (rad, m)
-_NEAR_ENOUGH = 1e-3  # m
-_DAMPING = 1e-5
 _GRAVITY = [0, 0, -9.81]  # as there; it moves nothing here
-
-
-JOINTS_OF_A_POSE = 6
 
 
 class PoseFollower:
@@ -79,8 +71,6 @@ class PoseFollower:
         self._moved: NDArray[np.intp] = np.array([active.index(joint) for joint in joints])
         self._mask = np.zeros(len(active), np.int32)
         self._mask[self._moved] = 1
-        limits = np.concatenate([joint.limits for joint in robot.driven]).astype(float)
-        self._limits = limits[[declared.index(joint) for joint in joints]].T
 
     def follow(
         self, position: Floats, quaternion: Floats, qpos: Floats, /
@@ -94,53 +84,6 @@ class PoseFollower:
             max_iterations=_MAX_ITERATIONS,
         )
         return found[self._moved] if solved else None
-
-
-class NearestFollower(PoseFollower):
-    """Follows places with arms of too few joints to choose an orientation as well.
-
-    The place comes first; of what then is free, the orientation gets as near as it can. Native has
-    no such control.
-    """
-
-    def follow(
-        self, position: Floats, quaternion: Floats, qpos: Floats, /
-    ) -> NDArray[np.float64] | None:
-        """Return the joints, or None if the place cannot be had."""
-        goal, turn = position.astype(float), rotation_of(quaternion)
-        found = qpos[self._taken].astype(float)
-        for _ in range(_MOST_DESCENTS):
-            place, toward, slopes = self._errors(found, goal, turn)
-            step = _first_then(place, toward, slopes)
-            longest = np.abs(step).max()
-            moved = found[self._moved] + step * min(1.0, _LONGEST_STEP / max(longest, 1e-12))
-            found[self._moved] = np.clip(moved, *self._limits)
-            if longest < _SETTLED:
-                break
-        place, _, _ = self._errors(found, goal, turn)
-        return found[self._moved] if np.linalg.norm(place) < _NEAR_ENOUGH else None
-
-    def _errors(self, qpos: Any, goal: Any, turn: Any) -> tuple[Any, Any, Any]:
-        """Return what is missing to place and orientation, and its slopes, in the link's frame."""
-        self._model.compute_forward_kinematics(qpos)
-        now = np.array(self._model.get_link_pose(self._link).to_transformation_matrix(), float)
-        back = now[:3, :3].T
-        slopes = self._model.compute_single_link_local_jacobian(qpos, self._link)
-        toward = rotation_vector(back @ turn)
-        return back @ (goal - now[:3, 3]), toward, np.array(slopes)[:, self._moved]
-
-
-def _first_then(first: Any, second: Any, slopes: Any) -> Any:
-    """Return the joint steps that mend three errors, and of three others what is left."""
-    inverse = _inverted(slopes[:3])
-    step = inverse @ first
-    free = np.eye(slopes.shape[1]) - inverse @ slopes[:3]
-    return step + free @ (_inverted(slopes[3:] @ free) @ (second - slopes[3:] @ step))
-
-
-def _inverted(slopes: Any) -> Any:
-    """Return a damped inverse of three rows."""
-    return slopes.T @ np.linalg.inv(slopes @ slopes.T + _DAMPING * np.eye(3))
 
 
 class _Subtree:

@@ -11,15 +11,15 @@ import torch
 from numpy.typing import NDArray
 
 from robot_layouts.simulation.rotations import quaternion
-from robot_layouts.simulation.sapien3.device import expect_render_device
-from robot_layouts.simulation.sapien3.pictures.backdrop import (
+from robot_layouts.simulation.sapien3.backdrop import (
     COLOR,
     PLACE,
     Backdrop,
     Bodies,
     planes,
 )
-from robot_layouts.simulation.sapien3.pictures.dressing import (
+from robot_layouts.simulation.sapien3.device import expect_render_device
+from robot_layouts.simulation.sapien3.dressing import (
     Wardrobe,
     lamp_pose,
     light_color,

@@ -1,1 +1,0 @@
-"""What is only needed to draw: cameras, visuals, pictures, the graphics device."""

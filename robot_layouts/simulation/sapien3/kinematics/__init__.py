@@ -1,1 +1,0 @@
-"""Where arms can reach, by SAPIEN's Pinocchio on what was built."""

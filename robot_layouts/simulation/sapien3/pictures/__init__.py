@@ -1,1 +1,0 @@
-"""What cameras see, drawn by SAPIEN."""
