@@ -29,7 +29,7 @@ class Layout(Arrangement):
 
     def _repr_html_(self) -> str:
         """Show a notebook the picture from above."""
-        from layouts.display import layout_html
+        from layouts.preview import layout_html
 
         return layout_html(self)
 

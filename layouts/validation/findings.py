@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from layouts.arrangement import Arrangement
 
 Point = tuple[float, ...]  # (3,) (m), world
 
@@ -129,43 +125,6 @@ class TargetReach:
     def blocked(self) -> bool:
         """Whether it would reach the target, were it not for a collision."""
         return bool(self.obstacles)
-
-
-@dataclass(frozen=True, eq=False)
-class Results:
-    """What a check of a layout found.
-
-    Attributes:
-        layout: The layout.
-        draws: How many postures with joint noise were looked at, besides the keyframes.
-        tables: Corners of each table's top (m), by name.
-        targets: Position of each target in the world (m).
-        findings: What is wrong, serious findings first.
-        clearances: Between robots, and between robots and tables; what is farther than 10 m
-            apart is left out.
-        shared: Workspaces that overlap; empty if they were not looked at.
-        workspaces: Volume of each robot's workspace (m³), to about a tenth; empty if they were not
-            looked at. A robot that slides for many metres is left out.
-        reaches: For each target and robot, whether it gets there.
-        outlines: For each robot the corners of its hulls at the keyframe, world (m); none for one
-            that could not be checked.
-    """
-
-    layout: Arrangement
-    draws: int
-    tables: dict[str, tuple[Point, ...]]
-    targets: dict[str, Point]
-    findings: tuple[Finding, ...]
-    clearances: tuple[Clearance, ...]
-    shared: tuple[SharedWorkspace, ...]
-    workspaces: dict[str, float]
-    reaches: tuple[TargetReach, ...]
-    outlines: dict[str, tuple[tuple[Point, ...], ...]]
-
-    @property
-    def ok(self) -> bool:
-        """Whether nothing serious was found."""
-        return not any(finding.serious for finding in self.findings)
 
 
 def length_text(metres: float) -> str:
