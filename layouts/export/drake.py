@@ -13,8 +13,7 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 import yaml
 
-from layouts.export.folders import replaced_folder
-from layouts.export.names import Names
+from layouts.export.files import Names, replaced_folder
 from layouts.export.urdf import base_link
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
 from robot_layouts.core.writing import write_whole

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from layouts.export.cell import RobotSource
-from layouts.export.names import Names
+from layouts.export.files import Names
 from layouts.visuals import GREY, Rgba, read_visuals, simplified
 from robot_layouts.kinematics.rotations import Floats
 from robots import AssetError, MissingPackageError

@@ -12,8 +12,7 @@ import numpy as np
 import yaml
 
 from layouts.export.cell import ExportedCell
-from layouts.export.ros2.groups import Group, Groups
-from layouts.export.ros2.names import RosNames
+from layouts.export.ros2.groups import Group, Groups, RosNames
 from robot_layouts.core.bounds import checked_number
 from robot_layouts.core.errors import MotionError
 from robot_layouts.core.new_files import write_new
