@@ -1,10 +1,13 @@
-"""The panel of a page: sliders, what is shown, the timeline."""
+"""A page with a panel of sliders, served; or one without, saved as a file that needs no server."""
 
 from __future__ import annotations
 
+import html
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Event, RLock
 from typing import Any, NoReturn
 
@@ -12,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts.viewer.cell import Cell, Contact, Motion
-from layouts.viewer.guard import is_loopback
+from layouts.viewer.guard import is_loopback, policy
 from layouts.viewer.scene import OVERLAYS, Scene
-from layouts.viewer.server import serving
-from layouts.viewer.text import Text, printable
+from layouts.viewer.server import ViewerError, serving
+from layouts.viewer.text import Text, as_html, printable
+from robot_layouts.core.commands import LOOPBACK
+from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.rotations import Floats
 from robots import JointGroup
 
@@ -30,6 +35,13 @@ LABELS = {
     "reach sphere": "Reach, sphere",
     "collision": "Collision shapes",
 }
+
+NO_SLIDERS = "A saved page has no sliders for joints; without --html, view serves one that has."
+NOTE_STYLE = (  # above the bar that plays a motion
+    "position: fixed; left: 0.75rem; bottom: 4.5rem; z-index: 1000; max-width: 24rem;"
+    " padding: 0.5rem 0.75rem; border-radius: 0.25rem; background: #fffd; color: #222;"
+    " box-shadow: 0 0 4px #0004; font: 0.8rem/1.4 sans-serif; overflow-wrap: anywhere"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,3 +253,71 @@ def contacts_text(contacts: list[Contact]) -> str:
     ]
     rest = len(contacts) - len(lines)
     return "\n".join([*lines, *([f"- and {rest} more"] if rest else [])])
+
+
+def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
+    """Save a page as one file that needs no server and fetches nothing.
+
+    It has no sliders for joints, and says so: robots stand as they start, or play the motion. What
+    is shown can be chosen in its scene tree.
+
+    Args:
+        cell: What to show.
+        path: Where to save; must end in ``.html``.
+
+    Raises:
+        MissingPackageError: If viser is not installed.
+        ViewerError: If the path ends otherwise, nothing can be written there, or the page of this
+            version of viser is of another make.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise ViewerError(f"cannot save a page as {target.name!r}; the name must end in .html")
+    with serving(LOOPBACK, 0, cell.title) as (server, _):
+        page = _recorded(server, cell).as_html()
+    page = _with(page, "<title>Viser</title>", f"<title>{html.escape(cell.title)}</title>")
+    rules = f'<meta http-equiv="Content-Security-Policy" content="{html.escape(policy())}">'
+    page = _with(page, "<head>", f"<head>\n{rules}")
+    page = _with(page, '<div id="root"></div>', f'<div id="root"></div>\n{_note(cell)}')
+    write_whole(target, page, ViewerError)
+    return target
+
+
+def _recorded(server: Any, cell: Cell) -> Any:
+    """Draw a cell, and return viser's recording of it."""
+    server.scene.set_up_direction("+z")
+    scene = Scene(server.scene, cell)
+    scene.aim(server.initial_camera)
+    scene.mark(cell.contacts(cell.start))
+    recording = server.get_scene_serializer()
+    if (motion := cell.motion) is not None:
+        for moment in range(len(motion)):
+            qpos = {name: np.asarray(rows[moment]) for name, rows in motion.qpos.items()}
+            for name, positions in qpos.items():
+                scene.pose(name, positions)
+            for name, rows in motion.poses.items():
+                scene.place(name, rows[moment])
+            scene.mark(cell.contacts(qpos))
+            recording.insert_sleep(motion.step_seconds)
+    return recording
+
+
+def _note(cell: Cell) -> str:
+    """Return what the panel of a served page says, as far as it holds without sliders."""
+    start = "Where the robots start:\n" + contacts_text(cell.contacts(cell.start))
+    paragraphs = "".join(f"<p>{as_html(text)}</p>" for text in (*cell.notes, start, NO_SLIDERS))
+    return (
+        f'<details open style="{NOTE_STYLE}"><summary><b>{as_html(cell.title)}</b></summary>'
+        f"{paragraphs}</details>"
+    )
+
+
+def _with(page: str, old: str, new: str) -> str:
+    """Put something in the place of a part of viser's page.
+
+    Raises:
+        ViewerError: If the page does not have that part once.
+    """
+    if page.count(old) != 1:
+        raise ViewerError(f"a page of this version of viser has {old} {page.count(old)} times")
+    return page.replace(old, new)

@@ -15,8 +15,7 @@ from layouts import side_by_side, single
 from layouts.__main__ import main
 from layouts.viewer import Cell, Motion, Thing, ViewerError
 from layouts.viewer.cell import Contact
-from layouts.viewer.page import Page, contacts_text
-from layouts.viewer.saved import NO_SLIDERS, save_html
+from layouts.viewer.page import NO_SLIDERS, Page, contacts_text, save_html
 from layouts.viewer.server import serving
 from layouts.visuals import MOST_TRIANGLES, coloured, read_visuals, simplified
 from robots import LayoutError, MissingPackageError, RobotRegistry
