@@ -181,7 +181,7 @@ class Standing:
 
 
 @dataclass(frozen=True, eq=False)
-class Tool:
+class ToolPoint:
     """A tool centre point, fixed to the link that orients it where it is at home.
 
     Attributes:
@@ -237,7 +237,7 @@ class ExportedCell:
         return tuple({id(robot.source): robot.source for robot in self.robots.values()}.values())
 
     @property
-    def tools(self) -> Iterator[Tool]:
+    def tools(self) -> Iterator[ToolPoint]:
         """The tool centre points of all arms, in their order."""
         for arm, part in self.layout.arms.items():
             place = self.layout.owner(arm)
@@ -247,7 +247,7 @@ class ExportedCell:
             poses = np.array([[standing.poses[link] for link in tree.links]])
             turned = poses[0, tcp.turned]
             position = transform(inverse_pose(turned), tcp.places(poses)[0])
-            yield Tool(arm, place, tree.links[tcp.turned], position)
+            yield ToolPoint(arm, place, tree.links[tcp.turned], position)
 
     @property
     def tables(self) -> dict[str, tuple[Floats, Floats]]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from layouts.export.cell import ExportedCell, RobotSource, Standing
 from layouts.export.files import LICENCES, licence_note, replaced_folder
-from layouts.export.meshes import Drawn, MeshFolder, Solid, drawn_meshes, solid_shapes
+from layouts.export.meshes import CollisionShape, Drawn, MeshFolder, drawn_meshes, solid_shapes
 from layouts.visuals import GREY, Rgba
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.quaternions import multiplied
@@ -247,7 +247,9 @@ def _drawn(drawn: Drawn, mesh: str) -> dict[str, str]:
     return {"class": DRAWN, "mesh": mesh, "rgba": _text(drawn.rgba)}
 
 
-def _solid(solid: Solid, mesh: str, friction: tuple[float, float] | None) -> dict[str, str]:
+def _solid(
+    solid: CollisionShape, mesh: str, friction: tuple[float, float] | None
+) -> dict[str, str]:
     geom = {"class": SOLID, **_shape(solid, mesh)}
     if friction is not None:
         # MuJoCo has one coefficient for what slides and what sticks; the others are its defaults.
@@ -255,7 +257,7 @@ def _solid(solid: Solid, mesh: str, friction: tuple[float, float] | None) -> dic
     return geom
 
 
-def _shape(solid: Solid, mesh: str) -> dict[str, str]:
+def _shape(solid: CollisionShape, mesh: str) -> dict[str, str]:
     shape = solid.shape
     match shape.kind:
         case "mesh":

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from layouts.export.cell import RobotSource
-from layouts.export.meshes import Drawn, Solid
+from layouts.export.meshes import CollisionShape, Drawn
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, quaternion_of
 from robots import CameraMount, GripperMaterial, MissingPackageError
 from robots.urdf.model import Inertial, ModelJoint
@@ -67,7 +67,7 @@ def add_drawn(stage: Any, path: str, drawn: Drawn) -> None:
     mesh.CreateDisplayOpacityAttr([alpha])
 
 
-def add_solid(stage: Any, path: str, solid: Solid) -> None:
+def add_solid(stage: Any, path: str, solid: CollisionShape) -> None:
     """Define a shape that collides and is not drawn."""
     UsdGeom, UsdPhysics = usd_modules("UsdGeom", "UsdPhysics")
 

@@ -188,12 +188,13 @@ class Cost:
         placed = {name: scene.placed(name, base) for name, base in bases.items()}
         sunk = sum(not robot.on_table for robot in placed.values())
         missing = sum(assignment.missing for assignment in assignments)
-        gaps = [(a, b, scene.gap(a, bases[a], b, bases[b])) for a, b in scene.pairs]
-        gaps += [
-            (scene.arms[a.arm].owner, o, gap) for a in assignments for o, gap in a.gaps.items()
-        ]
-        lacking = sum(float(self.lacking(gap)) for _, _, gap in gaps)
-        least = min([1.0, *(gap / scene.ample_gap(one, other) for one, other, gap in gaps)])
+        gaps = [[(a, b, scene.gap(a, bases[a], b, bases[b])) for a, b in scene.pairs]]
+        for assigned in assignments:
+            owner = scene.arms[assigned.arm].owner
+            gaps.append([(owner, other, gap) for other, gap in assigned.gaps.items()])
+        lacking = sum(sum(float(self.lacking(gap)) for _, _, gap in some) for some in gaps)
+        ratios = (gap / scene.ample_gap(a, b) for some in gaps for a, b, gap in some)
+        least = min([1.0, *ratios])
         shared = sum(scene.shared_volume(a, bases[a], b, bases[b]) for a, b in scene.pairs)
         reach = sum(
             self._targets_within_reach(arm.name, bases[arm.owner]) for arm in scene.arms.values()

@@ -128,8 +128,8 @@ class GridSearch:
         share = field[own.spaces].mean(axis=1) / len(others)
         gaps = self._cells.distances(bodies)[own.bodies].min(axis=1)
         ample = min(self._scene.ample_gap(name, other) for other in others)
-        value = share + GAP_VALUE * np.minimum(gaps / ample, 1.0)
-        return costs + CLEARANCE_COST * self._cost.lacking(gaps) - value
+        costs += CLEARANCE_COST * self._cost.lacking(gaps)
+        return costs - share - GAP_VALUE * np.minimum(gaps / ample, 1.0)
 
     def _robot_grid(self, name: str, bases: Sequence[BasePose], matrices: Floats) -> RobotGrid:
         scene, size = self._scene, self._cells.size

@@ -15,6 +15,7 @@ from layouts.placing.scene import SearchScene
 from layouts.validation.findings import length_text, reach_text
 from layouts.validation.report import Report
 from robot_layouts.core.progress import Progress
+from robot_layouts.kinematics.rotations import Floats
 from robots import LayoutError, RobotDescriptor
 
 STARTS = 12  # random ones of the search over the grid, for each place to begin at
@@ -99,7 +100,7 @@ def refine(
             before = candidate
             for name in random.permutation(list(scene.robots)).tolist():
                 progress.tell(f"{what}, {cost.count} places tried")
-                for move in moves.tolist():
+                for move in moves:
                     candidate = _moved(scene, cost, candidate, name, move)
             if candidate is before:
                 break
@@ -107,7 +108,7 @@ def refine(
 
 
 def _moved(
-    scene: SearchScene, cost: Cost, candidate: Candidate, name: str, move: list[float]
+    scene: SearchScene, cost: Cost, candidate: Candidate, name: str, move: Floats
 ) -> Candidate:
     """Repeat one step of one robot while that lowers the cost."""
     for _ in range(REPEATS):

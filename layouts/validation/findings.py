@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 Point = tuple[float, ...]  # (3,) (m), world
 
-SPOKEN_LINKS = 3  # pairs of links that a finding names in its text
+LISTED_LINKS = 3  # pairs of links that a finding names in its text
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def links_text(pairs: Sequence[LinkPair], between: tuple[str, str], *, table: bo
     one, other = between
     spoken = [
         f"{one}.{a} with {b if table else f'{other}.{b}'} ({length_text(pair.depth)})"
-        for pair in pairs[:SPOKEN_LINKS]
+        for pair in pairs[:LISTED_LINKS]
         for a, b in [pair.links]
     ]
     rest = len(pairs) - len(spoken)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SPOKEN_PAIRS = 12  # pairs of robots that the text tells distances and shared workspaces of
+LISTED_PAIRS = 12  # pairs of robots that the text tells distances and shared workspaces of
 
 GOOD, BAD, NARROW = "#1B7837", "#B2182B", "#B35806"
 
@@ -138,9 +138,9 @@ def _section(title: str, rows: Iterator[str]) -> Iterator[str]:
 
 def _distances(report: Report) -> Iterator[str]:
     ordered = sorted(report.clearances, key=lambda clearance: clearance.noisy_distance)
-    yield from map(_near, ordered[:SPOKEN_PAIRS])
-    if len(ordered) > SPOKEN_PAIRS:
-        yield f"and {len(ordered) - SPOKEN_PAIRS} pairs that stay farther apart"
+    yield from map(_near, ordered[:LISTED_PAIRS])
+    if len(ordered) > LISTED_PAIRS:
+        yield f"and {len(ordered) - LISTED_PAIRS} pairs that stay farther apart"
 
 
 def _near(clearance: Clearance) -> str:
@@ -158,7 +158,7 @@ def _spaces(report: Report) -> Iterator[str]:
         return
     yield ", ".join(f"{n} {volume:.2f} m³" for n, volume in report.workspaces.items())
     ordered = sorted(report.shared, key=lambda shared: -shared.volume)
-    for shared in ordered[:SPOKEN_PAIRS]:
+    for shared in ordered[:LISTED_PAIRS]:
         (one, other), (share, other_share) = shared.robots, shared.shares
         yield (
             f"{one} and {other} share {shared.volume:.2f} m³:"
@@ -166,8 +166,8 @@ def _spaces(report: Report) -> Iterator[str]:
         )
     if not ordered and len(report.workspaces) > 1:
         yield "no two of them share a point"
-    if len(ordered) > SPOKEN_PAIRS:
-        yield f"and {len(ordered) - SPOKEN_PAIRS} pairs that share less"
+    if len(ordered) > LISTED_PAIRS:
+        yield f"and {len(ordered) - LISTED_PAIRS} pairs that share less"
 
 
 def _targets(report: Report) -> Iterator[str]:

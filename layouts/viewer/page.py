@@ -14,9 +14,9 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts.viewer.cell import Cell, Contact, Motion
+from layouts.viewer.cell import Cell, LinkContact, Motion
 from layouts.viewer.guard import is_loopback, policy
-from layouts.viewer.scene import OVERLAYS, Scene
+from layouts.viewer.scene import OVERLAYS, CellScene
 from layouts.viewer.server import ViewerError, serving
 from layouts.viewer.text import Text, as_html, printable
 from robot_layouts.core.commands import LOOPBACK
@@ -62,7 +62,7 @@ class _Driven:
         return (first - offsets[0]) / multipliers[0] * multipliers + offsets
 
 
-class Page:
+class CellPage:
     """A cell with its panel, on a viser server."""
 
     def __init__(self, server: Any, cell: Cell) -> None:
@@ -78,7 +78,7 @@ class Page:
         self._stale.set()
         self._qpos = {name: start.copy() for name, start in cell.start.items()}
         server.scene.set_up_direction("+z")
-        self.scene = Scene(server.scene, cell)
+        self.scene = CellScene(server.scene, cell)
         self.scene.aim(server.initial_camera)
         self._sliders: dict[str, list[tuple[Any, _Driven]]] = {}
         self._timeline: Any = None
@@ -215,7 +215,7 @@ def serve(cell: Cell, host: str, port: int, announce: Callable[[str], None]) -> 
         ViewerError: If the port is in use, or the address is none of this machine's.
     """
     with serving(host, port, cell.title) as (server, address):
-        page = Page(server, cell)
+        page = CellPage(server, cell)
         tell(cell.title, host, address, announce)
         before = time.monotonic()
         while True:
@@ -242,7 +242,7 @@ def tell(title: str, host: str, address: str, announce: Callable[[str], None]) -
     announce(f"{title}: {address} (Ctrl-C ends it)")
 
 
-def contacts_text(contacts: list[Contact]) -> str:
+def contacts_text(contacts: list[LinkContact]) -> str:
     """Say which links overlap."""
     if not contacts:
         return "No robot touches another or itself."
@@ -286,7 +286,7 @@ def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
 def _recorded(server: Any, cell: Cell) -> Any:
     """Draw a cell, and return viser's recording of it."""
     server.scene.set_up_direction("+z")
-    scene = Scene(server.scene, cell)
+    scene = CellScene(server.scene, cell)
     scene.aim(server.initial_camera)
     scene.mark(cell.contacts(cell.start))
     recording = server.get_scene_serializer()

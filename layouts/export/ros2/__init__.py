@@ -15,7 +15,7 @@ import yaml
 from layouts.export.cell import ExportedCell
 from layouts.export.files import LICENCES, licence_note, replaced_folder, short_licences
 from layouts.export.ros2.description import description, speed_of
-from layouts.export.ros2.groups import Groups, RosNames
+from layouts.export.ros2.groups import PlanningGroups, RosNames
 from robot_layouts.core.pages import fragment
 from robots import LayoutError
 from robots.bodies.allowed import joined_pairs, rigid_groups, rigid_pairs
@@ -62,7 +62,7 @@ def _proper(package: str) -> str:
 
 def _write(folder: Path, cell: ExportedCell, package: str, *, visuals: bool) -> None:
     names = RosNames(cell)
-    groups = Groups(cell, names)
+    groups = PlanningGroups(cell, names)
     robots = [source.robot for source in cell.sources]
     meshes = folder / "meshes"
     content = {
@@ -133,7 +133,7 @@ def _yaml(value: dict[str, object]) -> str:
 # -- controllers, and MoveIt ---------------------------------------------------------------
 
 
-def _controllers(groups: Groups) -> dict[str, Any]:
+def _controllers(groups: PlanningGroups) -> dict[str, Any]:
     """Return the controllers, one for each group that has joints of its own."""
     kinds = {BROADCASTER: {"type": f"{BROADCASTER}/JointStateBroadcaster"}}
     own: dict[str, Any] = {}
@@ -151,7 +151,7 @@ def _controllers(groups: Groups) -> dict[str, Any]:
     return {"controller_manager": manager, **own}
 
 
-def _moveit_controllers(groups: Groups) -> dict[str, Any]:
+def _moveit_controllers(groups: PlanningGroups) -> dict[str, Any]:
     """Return which controller MoveIt sends the trajectories of which joints."""
     manager = "moveit_simple_controller_manager"
     own: dict[str, Any] = {
@@ -189,7 +189,7 @@ def _joint_limits(cell: ExportedCell, names: RosNames) -> dict[str, Any]:
     }
 
 
-def _kinematics(groups: Groups) -> dict[str, Any]:
+def _kinematics(groups: PlanningGroups) -> dict[str, Any]:
     """Return the solver of each group that is a chain."""
     return {
         group.name: {
@@ -202,7 +202,7 @@ def _kinematics(groups: Groups) -> dict[str, Any]:
     }
 
 
-def _ompl_planning(groups: Groups) -> dict[str, Any]:
+def _ompl_planning(groups: PlanningGroups) -> dict[str, Any]:
     """Return the planning pipeline, and the planners of each group."""
     requests = ("ResolveConstraintFrames", "ValidateWorkspaceBounds", "CheckStartStateBounds",
                 "CheckStartStateCollision")  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from layouts.export.cell import ExportedCell, Tool
+from layouts.export.cell import ExportedCell, ToolPoint
 from layouts.export.files import Names
 from robots.action_split import is_gripper
 from robots.parts import BODY
@@ -49,7 +49,7 @@ class RosNames:
         """Return the name of a robot's joint."""
         return self._joints[place, joint]
 
-    def tool(self, tool: Tool) -> str:
+    def tool(self, tool: ToolPoint) -> str:
         """Return the name of the link at a tool centre point."""
         return self._tools[tool.arm]
 
@@ -63,7 +63,7 @@ class RosNames:
 
 
 @dataclass(frozen=True)
-class Group:
+class PlanningGroup:
     """A planning group.
 
     Attributes:
@@ -72,7 +72,7 @@ class Group:
         joints: Joints of its own, by their names in the robot's URDF; empty if it is made of
             others. Those that follow another joint are among them.
         driven: Those of them that follow none.
-        groups: Groups that it is made of.
+        groups: PlanningGroups that it is made of.
         chain: First and last link of a chain of which all joints are its own, as ROS knows them.
         parent: Of a gripper the group that carries it, or empty.
         carrier: Of a gripper the link that carries it, as ROS knows it.
@@ -93,7 +93,7 @@ class Group:
         return f"{self.name}_controller"
 
 
-class Groups:
+class PlanningGroups:
     """The planning groups of a cell.
 
     Attributes:
@@ -105,23 +105,23 @@ class Groups:
         """Find them."""
         self._cell, self._names, self._taken = cell, names, Names(r"\W")
         self._tools = {tool.arm: tool for tool in cell.tools}
-        self.own: list[Group] = []
-        self.made: list[Group] = []
+        self.own: list[PlanningGroup] = []
+        self.made: list[PlanningGroup] = []
         wholes = {place: self._taken.new(place) for place in cell.robots}
         for place, whole in wholes.items():
             self._add_place(place, whole)
         if len(wholes) > 1:
-            self.made.append(Group(self._taken.new(ALL), "", groups=tuple(wholes.values())))
+            self.made.append(PlanningGroup(self._taken.new(ALL), "", groups=tuple(wholes.values())))
 
     @property
-    def parts(self) -> dict[str, tuple[Group, ...]]:
+    def parts(self) -> dict[str, tuple[PlanningGroup, ...]]:
         """The groups with joints of their own that each group is or is made of, by its name."""
-        parts: dict[str, tuple[Group, ...]] = {group.name: (group,) for group in self.own}
+        parts: dict[str, tuple[PlanningGroup, ...]] = {group.name: (group,) for group in self.own}
         for group in self.made:
             parts[group.name] = tuple(part for name in group.groups for part in parts[name])
         return parts
 
-    def joints(self, group: Group) -> list[str]:
+    def joints(self, group: PlanningGroup) -> list[str]:
         """Return the joints of a group's own that are driven, as ROS knows them."""
         return [self._names.joint(group.place, joint) for joint in group.driven]
 
@@ -133,10 +133,10 @@ class Groups:
             own = self._add_part(arm, place, f"{whole}_{limb}" if limb else whole)
             if limb and limb != BODY and own:
                 name = self._taken.new(f"{whole}_{limb}")
-                self.made.append(Group(name, place, groups=tuple(own)))
+                self.made.append(PlanningGroup(name, place, groups=tuple(own)))
                 own = [name]
             inside += own
-        self.made.append(Group(whole, place, groups=tuple(inside)))
+        self.made.append(PlanningGroup(whole, place, groups=tuple(inside)))
 
     def _add_part(self, part: str, place: str, prefix: str) -> list[str]:
         """Add what a robot or limb moves by itself, and return the names of its groups."""
@@ -145,19 +145,19 @@ class Groups:
         for name, group in robot.action_split.groups.items():
             if is_gripper(name) and not group.held:
                 gripper += group.joints
-        added: list[Group] = []
+        added: list[PlanningGroup] = []
         if arm:
             ending = "" if part.endswith(f".{BODY}") else "_arm"
             name = self._taken.new(f"{prefix}{ending}")
             chain = self._chain(self._tools.get(part), place, arm)
-            added.append(Group(name, place, *self._moved(place, arm), chain=chain))
+            added.append(PlanningGroup(name, place, *self._moved(place, arm), chain=chain))
         if gripper:
             name = self._taken.new(f"{prefix}_gripper")
             joints, driven = self._moved(place, gripper)
             parent = added[0].name if added else ""
             parents = {j.name: j.parent for j in self._cell.robots[place].source.model.joints}
             carrier = self._names.link(place, parents[joints[0]])
-            added.append(Group(name, place, joints, driven, parent=parent, carrier=carrier))
+            added.append(PlanningGroup(name, place, joints, driven, parent=parent, carrier=carrier))
         self.own += added
         return [group.name for group in added]
 
@@ -173,7 +173,7 @@ class Groups:
         return tuple(found), tuple(joint for joint in found if joint in driven)
 
     def _chain(
-        self, tool: Tool | None, place: str, joints: Sequence[str]
+        self, tool: ToolPoint | None, place: str, joints: Sequence[str]
     ) -> tuple[str, str] | None:
         """Return the ends of the chain that some joints make towards a tool, if they make one."""
         if tool is None:
