@@ -25,7 +25,7 @@ from tqdm import tqdm
 from benchmarks.records import Record, render, table, versions_of, write_record
 from benchmarks.robots.survey import Robot, find_robots, package_folder
 from layouts import Layout, face_to_face, grid, ring, side_by_side
-from layouts.validation.arguments import Rectangle
+from layouts.frames import Rectangle
 from robot_layouts.core.writing import write_whole
 from robot_layouts.experts import follow
 from robot_layouts.kinematics.rotations import Floats, quaternion_of

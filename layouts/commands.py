@@ -163,8 +163,7 @@ class Page(Server):
         Raises:
             RobotLayoutsError: If the page cannot be served or saved.
         """
-        from layouts.viewer.page import serve
-        from layouts.viewer.saved import NO_SLIDERS, save_html
+        from layouts.viewer.page import NO_SLIDERS, save_html, serve
         from layouts.viewer.server import import_viser
         from layouts.viewer.text import printable
 

@@ -13,7 +13,10 @@ from robot_layouts.kinematics.quaternions import multiplied, normalised, rotated
 from robots import LayoutError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
+Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
+
 ORIGIN: Vector3 = (0.0, 0.0, 0.0)
+TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
 
 # The edges of a table, and the turn about z (rad) from a table's +x to what each one faces: the
 # middle of the table.
@@ -136,6 +139,32 @@ def table_outlines(frames: Mapping[str, Pose]) -> dict[str, list[Vector3]]:
                 for a, b in ((north, east), (east, south), (south, west), (west, north))
             ]
     return corners
+
+
+def table_tops(
+    frames: Mapping[str, Pose], table: Rectangle | None
+) -> dict[str, tuple[Vector3, ...]]:
+    """Return the corners of each table's top (m): those of the frames, and the one given.
+
+    The one given, at z = 0, takes the place of a frame called ``table``.
+
+    Args:
+        frames: See `table_outlines`.
+        table: Outline of a table, or None.
+
+    Raises:
+        LayoutError: If it is no rectangle.
+    """
+    tops = {name: tuple(corners) for name, corners in table_outlines(frames).items()}
+    if table is not None:
+        if not (
+            all(math.isfinite(x) for x in table) and table[0] < table[2] and table[1] < table[3]
+        ):
+            raise LayoutError(f"table is {table}; it must be x_min, y_min, x_max, y_max (m)")
+        x_min, y_min, x_max, y_max = table
+        outline = ((x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max))
+        tops["table"] = tuple((x, y, 0.0) for x, y in outline)
+    return tops
 
 
 def wall(position: Vector3, *, yaw: float = 0.0) -> Frame:

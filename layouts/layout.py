@@ -29,7 +29,7 @@ class Layout(Arrangement):
 
     def _repr_html_(self) -> str:
         """Show a notebook the picture from above."""
-        from layouts.display import layout_html
+        from layouts.preview import layout_html
 
         return layout_html(self)
 
@@ -103,7 +103,7 @@ class Layout(Arrangement):
         """Save the layout as one URDF, in which every robot is fixed to a link ``world``.
 
         Names of links, joints and materials stand behind their place: ``left/panda_hand``.
-        Meshes stay where they are. Pairs of links that the robots' SRDFs excuse from collision
+        Meshes stay where they are. Pairs of links that the robots' SRDFs leave out of collision
         checks are saved beside it, as ``.srdf``. A URDF has no joint positions to start from;
         transmissions and other programs' extensions are left out.
 

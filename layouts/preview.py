@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import math
 import os
+from collections.abc import Mapping, Sequence
+from html import escape
 from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,12 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from layouts.description import action_text, decimal, facing_text, headline
-from layouts.frames import table_outlines
-from robot_layouts.core.figures import COLOURS, FAINT, INK, SUPPORTED, blank_figure
+from layouts.frames import Rectangle, table_tops
+from robot_layouts.core.figures import COLOURS, FAINT, INK, blank_figure, save_figure
 from robot_layouts.core.quoting import cut
-from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import forward, yaw_degrees
-from robots import LayoutError
+from robots import LayoutError, MissingPackageError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +27,8 @@ if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
     from layouts.placement import Placement
 
-Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
-
+MOST_IN_NOTEBOOKS = 64  # robots in a notebook's picture
+NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
 TABLE = "#EFE6D8"
 
 WIDTH = 8.0  # inches; 1200 pixels
@@ -60,20 +62,27 @@ def preview(
         LayoutError: If the ending names no supported format, or the table is no rectangle.
         MissingPackageError: If matplotlib is not installed.
     """
-    target = Path(path)
-    if target.suffix.lower() not in SUPPORTED:
-        raise LayoutError(
-            f"cannot save a preview as {target.name!r}; the name must end in"
-            f" {', '.join(SUPPORTED[:-1])} or {SUPPORTED[-1]}"
-        )
-    if table is not None and not (
-        all(math.isfinite(x) for x in table) and table[0] < table[2] and table[1] < table[3]
-    ):
-        raise LayoutError(f"table is {table}; it must be x_min, y_min, x_max, y_max (m)")
-    figure = draw(layout, table)
-    with written_whole(target) as unfinished:
-        figure.savefig(unfinished, format=target.suffix[1:].lower())
-    return target
+    return save_figure(lambda: draw(layout, table), path, "preview", LayoutError)
+
+
+def layout_html(layout: Arrangement) -> str:
+    """Return what notebooks show of a layout: an SVG; its table if that cannot be drawn.
+
+    That is where matplotlib is missing, or the layout is large.
+    """
+    text = f"<pre>{escape(str(layout))}</pre>"
+    if len(layout) > MOST_IN_NOTEBOOKS:
+        return text
+    try:
+        figure, file = draw(layout), io.StringIO()
+    except MissingPackageError:
+        return text
+    from matplotlib import rc_context
+
+    with rc_context({"svg.fonttype": "none"}):  # letters stay letters, a tenth of the size
+        figure.savefig(file, format="svg", metadata=NO_METADATA)
+    svg = file.getvalue()
+    return f'<div style="max-width: 640px">{svg[svg.index("<svg") :]}</div>'
 
 
 def draw(layout: Arrangement, table: Rectangle | None = None) -> Figure:
@@ -103,8 +112,8 @@ def draw(layout: Arrangement, table: Rectangle | None = None) -> Figure:
 
 def _bounds(layout: Arrangement, table: Rectangle | None) -> Rectangle:
     """Return the outline of everything drawn, with a margin (m)."""
-    boxes: list[Rectangle] = [] if table is None else [table]
-    for corners in table_outlines(layout.frame_poses).values():
+    boxes: list[Rectangle] = []
+    for corners in table_tops(layout.frame_poses, table).values():
         boxes += [(x, y, x, y) for x, y, _ in corners]
     for placement in layout.values():
         x, y, _ = placement.base_position
@@ -126,16 +135,7 @@ def _stretched(bounds: Rectangle, aspect: float) -> Rectangle:
 
 
 def _draw_plan(plan: Axes, layout: Arrangement, bounds: Rectangle, table: Rectangle | None) -> None:
-    from matplotlib.patches import Polygon
-
-    outlines = [
-        [(x, y) for x, y, _ in corners] for corners in table_outlines(layout.frame_poses).values()
-    ]
-    if table is not None:
-        x_min, y_min, x_max, y_max = table
-        outlines.append([(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)])
-    for outline in outlines:
-        plan.add_patch(Polygon(outline, facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5))
+    draw_tables(plan, table_tops(layout.frame_poses, table))
     if _draw_overlap(plan, layout, bounds):
         plan.set_title("grey: within reach of two or more", loc="right", color=FAINT, fontsize=10)
     plan.set_xlim(bounds[0], bounds[2])
@@ -143,7 +143,12 @@ def _draw_plan(plan: Axes, layout: Arrangement, bounds: Rectangle, table: Rectan
     arrow = HEADING * max(bounds[2] - bounds[0], bounds[3] - bounds[1])
     for index, (name, placement) in enumerate(layout.items()):
         _draw_robot(plan, index, name, placement, arrow)
-    plan.set_title(headline(layout), loc="left", color=INK, fontsize=13, fontweight="bold")
+    style_plan(plan, headline(layout))
+
+
+def style_plan(plan: Axes, title: str) -> None:
+    """Draw a view from above to scale, with a title, its axes and a grid."""
+    plan.set_title(title, loc="left", color=INK, fontsize=13, fontweight="bold")
     plan.set_xlabel("x (m)", color=INK)
     plan.set_ylabel("y (m)", color=INK)
     plan.set_aspect("equal")
@@ -152,6 +157,60 @@ def _draw_plan(plan: Axes, layout: Arrangement, bounds: Rectangle, table: Rectan
     plan.tick_params(colors=INK, labelsize=9, length=0)
     for spine in plan.spines.values():
         spine.set_color("#BBBBBB")
+
+
+def draw_tables(plan: Axes, tops: Mapping[str, Sequence[Sequence[float]]]) -> None:
+    """Draw tables from above, by the corners of their tops (m)."""
+    from matplotlib.patches import Polygon
+
+    for corners in tops.values():
+        outline = [(x, y) for x, y, _ in corners]
+        plan.add_patch(Polygon(outline, facecolor=TABLE, edgecolor="#C9B99B", zorder=0.5))
+
+
+def write_beside(
+    plan: Axes,
+    place: Sequence[float],
+    way: Sequence[float],
+    text: str,
+    colour: str,
+    *,
+    size: float,
+    gap: float,
+    zorder: int,
+    halo: float,
+    weight: str = "normal",
+) -> None:
+    """Write beside a place in a view from above.
+
+    Args:
+        plan: The view.
+        place: Where, (2,) (m).
+        way: To which side of it, a unit vector, (2,).
+        text: What to write.
+        colour: Of the letters.
+        size: Of the letters (points).
+        gap: From the place (points).
+        zorder: Among all that is drawn.
+        halo: Opacity of the white around the letters.
+        weight: Of the letters.
+    """
+    from matplotlib.patheffects import withStroke
+
+    x, y = way
+    plan.annotate(
+        text,
+        xy=(float(place[0]), float(place[1])),
+        xytext=(gap * x, gap * y),
+        textcoords="offset points",
+        color=colour,
+        fontsize=size,
+        fontweight=weight,
+        ha="right" if x < -0.5 else "left" if x > 0.5 else "center",
+        va="top" if y < -0.5 else "bottom" if y > 0.5 else "center",
+        path_effects=[withStroke(linewidth=3, foreground="white", alpha=halo)],
+        zorder=zorder,
+    )
 
 
 def _draw_overlap(plan: Axes, layout: Arrangement, bounds: Rectangle) -> bool:
@@ -232,27 +291,13 @@ def _write_name(
     plan: Axes, base: tuple[float, float], behind: tuple[float, float], name: str
 ) -> None:
     """Write a robot's name behind its back, where its arm is least, or below if it fits only so."""
-    from matplotlib.patheffects import withStroke
-
     length = math.hypot(*behind)
     x, y = (0.0, -1.0) if length <= 0.1 else (behind[0] / length, behind[1] / length)
     low, high = plan.get_xlim()
     room = (base[0] - low if x < 0 else high - base[0]) / (high - low)  # shares of the plan
     if abs(x) > 0.5 and room < (14 + 8.5 * len(name)) / (72 * (WIDTH - LEFT - RIGHT)):
         x, y = 0.0, -1.0
-    plan.annotate(
-        name,
-        xy=base,
-        xytext=(14 * x, 14 * y),
-        textcoords="offset points",
-        color=INK,
-        fontsize=12,
-        fontweight="bold",
-        path_effects=[withStroke(linewidth=3, foreground="white", alpha=0.8)],
-        ha="right" if x < -0.5 else "left" if x > 0.5 else "center",
-        va="top" if y < -0.5 else "bottom" if y > 0.5 else "center",
-        zorder=6,
-    )
+    write_beside(plan, base, (x, y), name, INK, size=12, gap=14, zorder=6, halo=0.8, weight="bold")
 
 
 def _draw_list(listing: Axes, layout: Arrangement) -> None:

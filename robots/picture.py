@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from robot_layouts.core.errors import DescriptorError
-from robot_layouts.core.figures import COLOURS, FAINT, INK, SUPPORTED, blank_figure
+from robot_layouts.core.figures import COLOURS, FAINT, INK, blank_figure, save_figure
 from robot_layouts.core.quoting import cut
-from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.rotations import Floats
 from robots.action_split import is_gripper
 from robots.bodies.hulls import RobotModel, load_model
@@ -76,16 +75,7 @@ def save_picture(
         DescriptorError: If the ending names no supported format.
         MissingPackageError: If matplotlib or python-fcl is not installed.
     """
-    target = Path(path)
-    if target.suffix.lower() not in SUPPORTED:
-        raise DescriptorError(
-            f"cannot save a picture as {target.name!r}; the name must end in"
-            f" {', '.join(SUPPORTED[:-1])} or {SUPPORTED[-1]}"
-        )
-    figure = draw(robot, notes)
-    with written_whole(target) as unfinished:
-        figure.savefig(unfinished, format=target.suffix[1:].lower())
-    return target
+    return save_figure(lambda: draw(robot, notes), path, "picture", DescriptorError)
 
 
 def draw(robot: RobotDescriptor, notes: Sequence[str] = ()) -> Figure:

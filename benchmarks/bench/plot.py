@@ -7,7 +7,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from benchmarks.bench.measurement import Measurement, number_text
-from layouts.preview import COLOURS, FAINT, INK, blank_figure
+from robot_layouts.core.figures import COLOURS, FAINT, INK, blank_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,48 +11,30 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from layouts.arrangement import Arrangement
-from layouts.export.names import Names
+from layouts.export.files import Names
+from layouts.frames import TABLE_DEPTH, table_outlines
 from layouts.placement import Placement
 from robot_layouts.core.commands import notice
 from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
     pose_matrix,
-    rpy_pose,
     transform,
 )
 from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
-from robots.descriptor import JointGroup
-from robots.urdf.checks import MOMENTS, PRODUCTS
-from robots.urdf.model import ModelJoint, UrdfModel
+from robots.urdf.model import Inertial, ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_urdf
 from robots.urdf.tcp import find_tcp
 from robots.urdf.text import numbers_of
 from robots.urdf.tree import kinematic_tree
 
-TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down, as checks of layouts have them
 SMALLEST_INERTIA = 1e-6  # kg, kg·m²; of links that move and have none, as SAPIEN takes it
 
 
-@dataclass(frozen=True, eq=False)
-class Inertial:
-    """Mass and inertia of a link.
-
-    Attributes:
-        mass: In kg.
-        position: Centre of mass in the link's frame, (3,) (m).
-        tensor: Inertia about it, along the axes of the link's frame, (3, 3) (kg·m²).
-    """
-
-    mass: float
-    position: Floats
-    tensor: Floats
-
-
 @dataclass(frozen=True)
-class Drive:
+class JointDrive:
     """How the descriptor drives a joint; see `robots.JointGroup` for the units.
 
     Attributes:
@@ -92,17 +74,18 @@ class RobotSource:
 
     @cached_property
     def inertials(self) -> dict[str, Inertial]:
-        """Masses and inertias by link; links whose shapes give them are left out."""
+        """Masses and inertias by link, along its axes; those that shapes give are left out."""
         found: dict[str, Inertial] = {}
         moved = {joint.child for joint in self.model.moving}
-        for link in self.root.iterfind("link"):
-            name = link.get("name", "")
-            inertial = _inertial(link)
-            if inertial is not None:
-                found[name] = inertial
-            elif name in moved and name not in self.model.collisions:
+        for link in self.model.links:
+            own = self.model.inertials.get(link)
+            if own is not None and own.mass != 0 and np.diag(own.tensor).any():
+                origin, turn = np.eye(4), own.origin[:3, :3]
+                origin[:3, 3] = own.origin[:3, 3]
+                found[link] = Inertial(own.mass, origin, turn @ own.tensor @ turn.T)
+            elif link in moved and link not in self.model.collisions:
                 tensor = SMALLEST_INERTIA * np.eye(3)
-                found[name] = Inertial(SMALLEST_INERTIA, np.zeros(3), tensor)
+                found[link] = Inertial(SMALLEST_INERTIA, np.eye(4), tensor)
         return found
 
     @cached_property
@@ -120,10 +103,15 @@ class RobotSource:
         return found
 
     @cached_property
-    def drives(self) -> dict[str, Drive]:
+    def drives(self) -> dict[str, JointDrive]:
         """Drives by joint, in the descriptor's order."""
-        groups = self.robot.action_split.groups.values()
-        return {joint: drive for group in groups for joint, drive in _drives(group)}
+        return {
+            joint: JointDrive(*drive, armature, group.friction)
+            for group in self.robot.action_split.groups.values()
+            for joint, drive, armature in zip(
+                group.joints, group.drives, group.armatures, strict=True
+            )
+        }
 
     @cached_property
     def allowed(self) -> frozenset[LinkPair]:
@@ -193,7 +181,7 @@ class Standing:
 
 
 @dataclass(frozen=True, eq=False)
-class Tool:
+class ToolPoint:
     """A tool centre point, fixed to the link that orients it where it is at home.
 
     Attributes:
@@ -249,7 +237,7 @@ class ExportedCell:
         return tuple({id(robot.source): robot.source for robot in self.robots.values()}.values())
 
     @property
-    def tools(self) -> Iterator[Tool]:
+    def tools(self) -> Iterator[ToolPoint]:
         """The tool centre points of all arms, in their order."""
         for arm, part in self.layout.arms.items():
             place = self.layout.owner(arm)
@@ -259,62 +247,34 @@ class ExportedCell:
             poses = np.array([[standing.poses[link] for link in tree.links]])
             turned = poses[0, tcp.turned]
             position = transform(inverse_pose(turned), tcp.places(poses)[0])
-            yield Tool(arm, place, tree.links[tcp.turned], position)
+            yield ToolPoint(arm, place, tree.links[tcp.turned], position)
 
     @property
     def tables(self) -> dict[str, tuple[Floats, Floats]]:
         """Tables as solid boxes: pose of the middle, (4, 4), and size, (3,) (m), by name."""
         frames, found = self.layout.frame_poses, dict[str, tuple[Floats, Floats]]()
-        for name, pose in frames.items():
-            edges = [frames.get(f"{name}.{edge}") for edge in ("east", "west", "north", "south")]
-            if any(edge is None for edge in edges):
-                continue
-            east, west, north, south = (np.array(edge.position) for edge in edges if edge)
+        for name in table_outlines(frames):
+            pose = frames[name]
+            edges = (frames[f"{name}.{edge}"] for edge in ("east", "west", "north", "south"))
+            east, west, north, south = (np.array(edge.position) for edge in edges)
             middle = pose_matrix(pose.position, pose.quaternion)
-            size = np.array([np.linalg.norm(east - west), np.linalg.norm(north - south), 0.0])
-            size[2] = TABLE_DEPTH
+            width, depth = np.linalg.norm(east - west), np.linalg.norm(north - south)
+            size = np.array([width, depth, TABLE_DEPTH])
             middle[:3, 3] -= middle[:3, 2] * TABLE_DEPTH / 2
             found[name] = (middle, size)
         return found
 
 
 def _source(robot: RobotDescriptor, name: str, *, visuals: bool) -> RobotSource:
-    urdf, drawn = _located(robot) if visuals else (robot.urdf.locate(), False)
+    drawn = visuals
+    try:
+        urdf = robot.urdf.locate(pictures=visuals)
+    except AssetError as error:
+        if not visuals:
+            raise
+        urdf, drawn = robot.urdf.locate(), False
+        notice(f"{robot.name} is drawn by its collision shapes: {error}")
     contents = read_urdf(urdf)
     model = read_model(contents, str(urdf))
     kinematic_tree(model, robot.joints)  # refuses a descriptor that contradicts its URDF
     return RobotSource(robot, name, urdf, parse_urdf(contents, str(urdf)), model, drawn)
-
-
-def _located(robot: RobotDescriptor) -> tuple[Path, bool]:
-    """Return a robot's URDF, and whether the files that it is drawn by are there."""
-    try:
-        return robot.urdf.locate(pictures=True), True
-    except AssetError as error:
-        urdf = robot.urdf.locate()
-        notice(f"{robot.name} is drawn by its collision shapes: {error}")
-        return urdf, False
-
-
-def _drives(group: JointGroup) -> Iterator[tuple[str, Drive]]:
-    for joint, drive, armature in zip(group.joints, group.drives, group.armatures, strict=True):
-        yield joint, Drive(*drive, armature, group.friction)
-
-
-def _inertial(link: Element) -> Inertial | None:
-    """Return mass and inertia of a link, or None if its URDF gives none or zeros."""
-    inertial, where = link.find("inertial"), f"link {link.get('name')!r}"
-    if inertial is None:
-        return None
-    mass, tensor, origin = (inertial.find(tag) for tag in ("mass", "inertia", "origin"))
-    weight = numbers_of(mass, "value", (0.0,), where)[0]
-    xx, yy, zz, xy, xz, yz = (
-        numbers_of(tensor, key, (0.0,), where)[0] for key in (*MOMENTS, *PRODUCTS)
-    )
-    if weight == 0 or not any((xx, yy, zz)):
-        return None
-    xyz, rpy = (numbers_of(origin, key, (0.0, 0.0, 0.0), where) for key in ("xyz", "rpy"))
-    pose = rpy_pose(xyz, rpy)
-    turn = pose[:3, :3]
-    own = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return Inertial(weight, pose[:3, 3], turn @ own @ turn.T)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import count
 from pathlib import Path
@@ -13,9 +12,8 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 import yaml
 
-from layouts.export.folders import replaced_folder
-from layouts.export.names import Names
-from layouts.export.urdf import base_link
+from layouts.export.files import Names, replaced_folder
+from layouts.export.urdf import COPIED, base_link
 from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.quaternions import quaternion_rpy
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
 
 ENDING = ".dmd.yaml"  # by which Drake's parser knows directives
 WORLD = "world"  # as Drake calls what everything stands in
-COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
 
 
 def write_drake(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
@@ -114,6 +111,7 @@ def _write_model(
 ) -> None:
     """Write a URDF whose meshes are Wavefront files beside it."""
     folder.mkdir(parents=True)
+    files = Names()
     source = parse_urdf(read_urdf(urdf), str(urdf))
     robot = Element("robot", source.attrib)
     for element in source:
@@ -123,8 +121,8 @@ def _write_model(
             link = element.get("name", "")
             for visual in element.findall("visual"):
                 element.remove(visual)
-            element.extend(_visuals(visuals.get(link, ()), link, folder))
-            _convert_collisions(element, urdf, folder)
+            element.extend(_visuals(visuals.get(link, ()), link, folder, files))
+            _convert_collisions(element, urdf, folder, files)
         robot.append(element)
     _rename_world(robot)
     indent(robot)
@@ -143,45 +141,33 @@ def _rename_world(robot: Element) -> None:
             element.set(key, new)
 
 
-def _file_name(link: str, kind: str, number: int) -> str:
-    """Return the name of a mesh's file, in which no link's name leads to another folder."""
-    return f"{re.sub(r'[^A-Za-z0-9_.-]', '_', link)}_{kind}_{number}.obj"
-
-
-def _visuals(parts: Sequence[Part], link: str, folder: Path) -> Iterator[Element]:
+def _visuals(parts: Sequence[Part], link: str, folder: Path, files: Names) -> Iterator[Element]:
     for number, part in enumerate(parts):
         name = f"{link}_visual_{number}"
-        file = _unused(folder / _file_name(link, "visual", number))
         visual = Element("visual", name=name)
-        _save(simplified(part).mesh, file)
-        SubElement(SubElement(visual, "geometry"), "mesh", filename=file.name)
+        file = _saved(simplified(part).mesh, folder, files.new(name))
+        SubElement(SubElement(visual, "geometry"), "mesh", filename=file)
         material = SubElement(visual, "material", name=name)
         SubElement(material, "color", rgba=" ".join(f"{x:.4g}" for x in part.rgba))
         yield visual
 
 
-def _convert_collisions(link: Element, urdf: Path, folder: Path) -> None:
+def _convert_collisions(link: Element, urdf: Path, folder: Path, files: Names) -> None:
     import trimesh
 
     where = f"{urdf}, link {link.get('name')!r}"
     for number, mesh in enumerate(link.iterfind("collision/geometry/mesh")):
         path = resolve(mesh.get("filename", ""), urdf.as_posix(), os.path.isfile)
-        file = _unused(folder / _file_name(link.get("name", ""), "collision", number))
-        _save(trimesh.util.concatenate(load_meshes(path, where, urdf.as_posix())), file)
-        mesh.set("filename", file.name)
+        whole = trimesh.util.concatenate(load_meshes(path, where, urdf.as_posix()))
+        name = files.new(f"{link.get('name', '')}_collision_{number}")
+        mesh.set("filename", _saved(whole, folder, name))
 
 
-def _unused(file: Path) -> Path:
-    """Return a path that no other link's mesh has taken."""
-    return next(p for i in count(1) if not (p := file if i == 1 else _numbered(file, i)).exists())
-
-
-def _numbered(file: Path, number: int) -> Path:
-    return file.with_name(f"{file.stem}_{number}{file.suffix}")
-
-
-def _save(mesh: Any, path: Path) -> None:
+def _saved(mesh: Any, folder: Path, name: str) -> str:
+    """Save a mesh as a Wavefront file, and return the file's name."""
     import trimesh
 
     bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    bare.export(path, include_normals=False, include_texture=False, include_color=False)
+    file = f"{name}.obj"
+    bare.export(folder / file, include_normals=False, include_texture=False, include_color=False)
+    return file

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from layouts.export.cell import RobotSource
-from layouts.export.names import Names
+from layouts.export.files import Names
 from layouts.visuals import GREY, Rgba, read_visuals, simplified
 from robot_layouts.kinematics.rotations import Floats
 from robots import AssetError, MissingPackageError
@@ -35,7 +35,7 @@ class Drawn:
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class CollisionShape:
     """A shape that collides.
 
     Attributes:
@@ -82,7 +82,7 @@ def _area(mesh: Any) -> float:
 
 def solid_shapes(
     source: RobotSource, hulls: Sequence[str] = AS_HULLS
-) -> dict[str, tuple[Solid, ...]]:
+) -> dict[str, tuple[CollisionShape, ...]]:
     """Return what each link collides with: plain shapes, and convex hulls of the others.
 
     Args:
@@ -95,7 +95,8 @@ def solid_shapes(
     """
     return {
         link: tuple(
-            Solid(shape, _hull(shape, source) if shape.kind in hulls else None) for shape in shapes
+            CollisionShape(shape, _hull(shape, source) if shape.kind in hulls else None)
+            for shape in shapes
         )
         for link, shapes in source.model.collisions.items()
     }

@@ -11,16 +11,15 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from layouts.export.cell import ExportedCell, Inertial, RobotSource, Standing
-from layouts.export.folders import LICENCES, replaced_folder
-from layouts.export.licences import licence_note
-from layouts.export.meshes import Drawn, MeshFolder, Solid, drawn_meshes, solid_shapes
+from layouts.export.cell import ExportedCell, RobotSource, Standing
+from layouts.export.files import LICENCES, licence_note, replaced_folder
+from layouts.export.meshes import CollisionShape, Drawn, MeshFolder, drawn_meshes, solid_shapes
 from layouts.visuals import GREY, Rgba
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robots import CameraMount, LayoutError
-from robots.urdf.model import ModelJoint
+from robots.urdf.model import Inertial, ModelJoint
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
@@ -248,7 +247,9 @@ def _drawn(drawn: Drawn, mesh: str) -> dict[str, str]:
     return {"class": DRAWN, "mesh": mesh, "rgba": _text(drawn.rgba)}
 
 
-def _solid(solid: Solid, mesh: str, friction: tuple[float, float] | None) -> dict[str, str]:
+def _solid(
+    solid: CollisionShape, mesh: str, friction: tuple[float, float] | None
+) -> dict[str, str]:
     geom = {"class": SOLID, **_shape(solid, mesh)}
     if friction is not None:
         # MuJoCo has one coefficient for what slides and what sticks; the others are its defaults.
@@ -256,7 +257,7 @@ def _solid(solid: Solid, mesh: str, friction: tuple[float, float] | None) -> dic
     return geom
 
 
-def _shape(solid: Solid, mesh: str) -> dict[str, str]:
+def _shape(solid: CollisionShape, mesh: str) -> dict[str, str]:
     shape = solid.shape
     match shape.kind:
         case "mesh":
@@ -314,7 +315,7 @@ def _least_inertia(joint: ModelJoint, source: RobotSource) -> float:
 def _inertial(inertial: Inertial) -> dict[str, str]:
     full = inertial.tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return {
-        "pos": _text(inertial.position.tolist()),
+        "pos": _text(inertial.origin[:3, 3].tolist()),
         "mass": repr(inertial.mass),
         "fullinertia": _text(full.tolist()),
     }

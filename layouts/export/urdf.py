@@ -45,7 +45,7 @@ def write_urdf(
         file = placement.robot.urdf.locate(pictures=visuals)
         urdf.append(_fixed_to_world(place, placement, file))
         urdf.extend(_renamed(file, place, folder, visuals=visuals))
-        semantics.extend(_excuses(placement.robot, file, place))
+        semantics.extend(_disabled_pairs(placement.robot, file, place))
     _write(urdf, target)
     beside = target.with_suffix(".srdf")
     if len(semantics):
@@ -86,28 +86,23 @@ def _file(reference: str, urdf: Path, folder: Path | None) -> str:
     return path if folder is None else Path(os.path.relpath(path, folder)).as_posix()
 
 
-def _excuses(robot: RobotDescriptor, file: Path, place: str) -> Iterator[Element]:
+def _disabled_pairs(robot: RobotDescriptor, file: Path, place: str) -> Iterator[Element]:
     """Yield the pairs of links that a robot may overlap with itself in, renamed.
 
     They are those that its descriptor allows, or else those of the SRDF beside its URDF.
     """
-    for pair in _pairs_of_srdf(file) if robot.allowed_collisions is None else _own(robot, file):
+    pairs: list[Element] = []
+    if robot.allowed_collisions is not None:
+        model = read_model(read_urdf(file), str(file))
+        apart = read_allowed_pairs(robot, model, file) - joined_pairs(model)
+        for one, other in sorted(sorted(p) for p in apart if p <= model.collisions.keys()):
+            pairs.append(Element("disable_collisions", link1=one, link2=other, reason="Default"))
+    elif (srdf := srdf_beside(file)) is not None:
+        pairs.extend(parse_urdf(read_urdf(srdf), str(srdf)).iterfind("disable_collisions"))
+    for pair in pairs:
         for key in ("link1", "link2"):
             pair.set(key, f"{place}/{pair.get(key)}")
         yield pair
-
-
-def _pairs_of_srdf(file: Path) -> Iterator[Element]:
-    srdf = srdf_beside(file)
-    if srdf is not None:
-        yield from parse_urdf(read_urdf(srdf), str(srdf)).iterfind("disable_collisions")
-
-
-def _own(robot: RobotDescriptor, file: Path) -> Iterator[Element]:
-    model = read_model(read_urdf(file), str(file))
-    apart = read_allowed_pairs(robot, model, file) - joined_pairs(model)
-    for pair in sorted(sorted(pair) for pair in apart if pair <= model.collisions.keys()):
-        yield Element("disable_collisions", link1=pair[0], link2=pair[1], reason="Default")
 
 
 def _write(root: Element, target: Path) -> None:

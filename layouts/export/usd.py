@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from layouts.export.cell import ExportedCell, RobotSource, Standing
-from layouts.export.licences import licence_note
+from layouts.export.files import Names, licence_note
 from layouts.export.meshes import drawn_meshes, solid_shapes
-from layouts.export.names import Names
-from layouts.export.usd_joints import add_fixed_base, add_joint, tie
-from layouts.export.usd_modules import usd_modules
-from layouts.export.usd_shapes import (
+from layouts.export.usd_prims import (
     add_box,
     add_camera,
     add_drawn,
+    add_fixed_base,
+    add_joint,
     add_solid,
     place,
+    set_attribute,
     set_inertia,
     surface,
+    tie,
+    usd_modules,
 )
 from robot_layouts.core.writing import PARTIAL, written_whole
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix
@@ -133,7 +135,7 @@ class _Stage:
         place(prim, standing.base)
         UsdPhysics.ArticulationRootAPI.Apply(prim.GetPrim())
         prim.GetPrim().AddAppliedSchema("PhysxArticulationAPI")
-        _set(prim.GetPrim(), "physxArticulation:enabledSelfCollisions", "Bool", True)
+        set_attribute(prim.GetPrim(), "physxArticulation:enabledSelfCollisions", "Bool", True)
         links = _Paths(str(prim.GetPath()), "joints")
         back = inverse_pose(standing.base)
         for link in source.model.links:
@@ -153,7 +155,7 @@ class _Stage:
         prim.SetDisplayName(link)  # which may have letters that no path has
         UsdPhysics.RigidBodyAPI.Apply(prim)
         prim.AddAppliedSchema("PhysxRigidBodyAPI")
-        _set(prim, "physxRigidBody:disableGravity", "Bool", True)
+        set_attribute(prim, "physxRigidBody:disableGravity", "Bool", True)
         if link in source.inertials:
             set_inertia(prim, source.inertials[link])
         for kind in ("drawn", "solid"):
@@ -178,10 +180,8 @@ class _Stage:
         )
         for joint in source.model.ordered:
             ends = links.of(joint.parent), links.of(joint.child)
-            drive = source.drives[joint.name] if joint.name in source.leaders else None
-            made = add_joint(self._stage, joints.of(joint.name), ends, joint)
-            made.prim.SetDisplayName(joint.name)
-            made.finish(joint, drive, source, standing.home.get(joint.name, 0.0))
+            home = standing.home.get(joint.name, 0.0)
+            add_joint(self._stage, joints.of(joint.name), ends, joint, source, home)
         for joint in source.followers:
             prim = self._stage.GetPrimAtPath(joints.of(joint.name))
             tie(prim, joints.of(joint.mimics or ""), joint)
@@ -200,9 +200,3 @@ class _Stage:
         for camera in standing.source.robot.cameras:
             path = f"{links.of(camera.link)}/camera_{_identifier(camera.name)}"
             add_camera(self._stage, path, camera)
-
-
-def _set(prim: Any, name: str, kind: str, value: Any) -> None:
-    Sdf = usd_modules("Sdf")
-
-    prim.CreateAttribute(name, getattr(Sdf.ValueTypeNames, kind)).Set(value)

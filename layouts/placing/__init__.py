@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 
 from layouts.frames import Frame
 from layouts.layout import Layout
-from layouts.placement import RobotLike
-from layouts.placing.demands import ReachedBy
+from layouts.placement import Placement, RobotLike, check_robots, load_robot
+from robot_layouts.core.bounds import checked_number, checked_whole
+from robot_layouts.core.errors import MissingPackageError
+from robot_layouts.core.progress import Progress
+from robots import LayoutError
 
-__all__ = ["ReachedBy", "search"]
+__all__ = ["Around", "ReachedBy", "search"]
+
+Around = Mapping[str, Frame] | Frame | Sequence[float]
+ReachedBy = str | Mapping[str, str | Sequence[str]]
 
 
 def search(
     robots: Mapping[str, RobotLike],
     targets: Mapping[str, Sequence[float]] | Sequence[Sequence[float]] = (),
     *,
-    around: Mapping[str, Frame] | Frame | Sequence[float] | None = None,
+    around: Around | None = None,
     within: tuple[float, float, float, float] | None = None,
     heights: float | Mapping[str, float] = 0.0,
     reached_by: ReachedBy = "any",
@@ -69,19 +76,41 @@ def search(
         AssetError: If a robot's files cannot be found or make no sense.
         MissingPackageError: If python-fcl or scipy is not installed.
     """
-    from layouts.placing.searching import search
+    try:
+        import_module("scipy")
+    except ImportError as error:
+        raise MissingPackageError(
+            "a search for places needs scipy and python-fcl: pip install 'robot-layouts[checks]'"
+        ) from error
+    from layouts.placing.bases import ground_of
+    from layouts.placing.cost import requirements_of
+    from layouts.placing.refinement import centred, expect_sound, find_layout
+    from layouts.placing.scene import SearchScene
+    from layouts.validation.check import named_targets
 
-    return search(
-        robots,
-        targets,
-        around=around,
-        within=within,
-        heights=heights,
-        reached_by=reached_by,
-        keyframe=keyframe,
-        clearance=clearance,
-        partial=partial,
-        seed=seed,
-        tries=tries,
-        patience=patience,
+    check_robots(robots)
+    if not robots:
+        raise LayoutError("a search needs at least one robot")
+    loaded = {name: load_robot(robot) for name, robot in robots.items()}
+    seed = checked_whole("seed", seed, 0, None, LayoutError)
+    tries = checked_whole("tries", tries, 1, None, LayoutError)
+    clearance = checked_number("clearance", clearance, 0.0, 10.0, LayoutError, "m")
+    patience = checked_number("patience", patience, 0.0, 1e9, LayoutError, "s")
+    named = named_targets(targets)
+    alone = Layout({name: Placement(robot, keyframe=keyframe) for name, robot in loaded.items()})
+    requirements = requirements_of(named, reached_by, alone)
+    ground = ground_of(around, within, heights, loaded, list(named.values()))
+    expect_sound(loaded, keyframe)
+
+    def late(what: str) -> LayoutError:
+        return LayoutError(
+            f"no layout after {patience:g} s, while looking for places: {what}; raise patience,"
+            " lower tries, or ask for less"
+        )
+
+    progress = Progress(work="looking for places", seconds=patience, late=late)
+    scene = SearchScene(loaded, keyframe, ground)
+    layout = find_layout(
+        scene, requirements, clearance, progress, partial=partial, seed=seed, tries=tries
     )
+    return layout if named or around is not None or within is not None else centred(layout)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 
 from layouts.arrangement import Arrangement
-from layouts.placement import Placement
+from layouts.frames import TABLE_DEPTH, Rectangle, table_tops
 from layouts.validation.advice import (
     NARROW,
     to_be_reached,
@@ -18,12 +18,14 @@ from layouts.validation.advice import (
     to_start_elsewhere,
     to_touch_itself_no_more,
 )
-from layouts.validation.arguments import Rectangle, Targets, named_targets, table_tops
 from layouts.validation.collisions import (
     Approach,
     Postures,
     fixed,
+    moving_hulls,
     nearest,
+    noisy_postures,
+    slab_hull,
     stand,
     touching,
 )
@@ -38,9 +40,9 @@ from layouts.validation.findings import (
     links_text,
     reach_text,
 )
-from layouts.validation.reach import Reach, Solution, Workspace
+from layouts.validation.reach import Arm, Workspace
 from layouts.validation.report import Report
-from layouts.validation.slabs import slab_hull
+from robot_layouts.core.bounds import shown
 from robot_layouts.core.progress import Progress
 from robot_layouts.kinematics.rotations import Floats
 from robots import (
@@ -52,7 +54,8 @@ from robots import (
 )
 from robots.bodies.hulls import RobotModel, load_model
 
-TABLE_DEPTH = 0.9  # m; tables are solid, from their tops down
+Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]
+
 SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do not
 LIMIT_TOLERANCE = 1e-4  # rad or m; limits and keyframes are written with four digits
 
@@ -69,10 +72,6 @@ def validate(
     """Check a layout; see `layouts.Layout.validate`."""
     if not (isinstance(samples, int) and samples >= 0):
         raise LayoutError(f"samples is {samples!r}; it must be an integer of 0 or more")
-    if table is not None and not (
-        all(math.isfinite(x) for x in table) and table[0] < table[2] and table[1] < table[3]
-    ):
-        raise LayoutError(f"table is {table}; it must be x_min, y_min, x_max, y_max (m)")
     return _Check(layout, named_targets(targets), samples, table, seed).run(workspaces)
 
 
@@ -88,13 +87,18 @@ class _Check:
         seed: int,
     ) -> None:
         self._layout, self._targets, self._draws = layout, targets, samples
-        self._tops = table_tops(layout, table)
+        self._tops = table_tops(layout.frame_poses, table)
         self._progress = Progress(work="checking the layout")
         self._unread: dict[str, RobotLayoutsError] = {}
         self._models = dict(self._load())
         if self._unread and not self._models:
             raise next(iter(self._unread.values()))
         self._checked = {name: layout[name] for name in self._models}
+        self._arms = {
+            name: Arm(layout, name, self._models[layout.owner(name)])
+            for name in layout.arms
+            if layout.owner(name) in self._models
+        }
         random = np.random.default_rng(seed)
         self._robots = {
             name: stand(name, p.base_pose, self._models[name], noisy_postures(p, samples, random))
@@ -141,46 +145,30 @@ class _Check:
 
     def _unreadable(self) -> Iterator[Finding]:
         for name, error in self._unread.items():
-            yield Finding(
-                "files",
-                True,
-                (name,),
-                (),
-                0.0,
-                "m",
-                f"{name} cannot be checked: {error}",
+            what = f"{name} cannot be checked: {error}"
+            advice = (
                 f"mend the files or the descriptor of {self._layout[name].robot.name}; the others"
-                f" are checked as if {name} were not there",
+                f" are checked as if {name} were not there"
             )
-
-    # -- joint limits ------------------------------------------------------------------------
+            yield Finding("files", True, (name,), (), 0.0, "m", what, advice)
 
     def _limits(self) -> Iterator[Finding]:
         for name, placement in self._checked.items():
+            groups = placement.robot.action_split.groups.values()
+            units = {joint: group.unit for group in groups for joint in group.joints}
             limits = self._models[name].kinematics.limits
             for joint, value, (low, high) in zip(
                 placement.robot.joints, placement.start_qpos, limits.tolist(), strict=True
             ):
-                excess = max(low - value, value - high)
+                excess, unit = max(low - value, value - high), units[joint]
                 if excess > LIMIT_TOLERANCE:
-                    unit = self._unit(placement, joint)
-                    yield Finding(
-                        "joint limit",
-                        True,
-                        (name,),
-                        (),
-                        excess,
-                        unit,
+                    what = (
                         f"keyframe {placement.start_keyframe!r} of {name} puts {joint} at"
                         f" {value:g} {unit}, {excess:.3g} {unit} beyond its limits"
-                        f" {low:g} … {high:g}",
-                        f"put {joint} within its limits, or {to_start_elsewhere(placement)}",
+                        f" {low:g} … {high:g}"
                     )
-
-    @staticmethod
-    def _unit(placement: Placement, joint: str) -> str:
-        groups = placement.robot.action_split.groups.values()
-        return next(group.unit for group in groups if joint in group.joints)
+                    advice = f"put {joint} within its limits, or {to_start_elsewhere(placement)}"
+                    yield Finding("joint limit", True, (name,), (), excess, unit, what, advice)
 
     # -- collisions --------------------------------------------------------------------------
 
@@ -191,17 +179,13 @@ class _Check:
             if overlaps:
                 pairs = _worst(overlaps)
                 still = any(overlap.posture == 0 for overlap in overlaps)
-                yield Finding(
-                    "self-collision",
-                    still or pairs[0].depth > SHALLOW,
-                    (name,),
-                    pairs,
-                    pairs[0].depth,
-                    "m",
+                serious, depth = still or pairs[0].depth > SHALLOW, pairs[0].depth
+                what = (
                     f"{name} touches itself {self._when(overlaps)}:"
-                    f" {links_text(pairs, (name, name))}",
-                    to_touch_itself_no_more(self._layout[name], overlaps),
+                    f" {links_text(pairs, (name, name))}"
                 )
+                advice = to_touch_itself_no_more(self._layout[name], overlaps)
+                yield Finding("self-collision", serious, (name,), pairs, depth, "m", what, advice)
 
     def _neighbours(
         self,
@@ -232,38 +216,25 @@ class _Check:
 
     def _collision(self, one: Postures, other: Postures, overlaps: list[Approach]) -> Finding:
         pairs, between = _worst(overlaps), (one.name, other.name)
-        at_table = other.name in self._surfaces
-        advice, farther = (
-            (to_leave_the_table(one.name, self._layout[one.name], overlaps[0]), None)
-            if at_table
-            else to_stand_apart(self._layout, one, other)
-        )
-        return Finding(
-            "table" if at_table else "collision",
-            True,
-            between[:1] if at_table else between,
-            pairs,
-            pairs[0].depth,
-            "m",
+        table = other.name in self._surfaces
+        what = (
             f"{one.name} and {other.name} collide {self._when(overlaps)}:"
-            f" {links_text(pairs, between, table=at_table)}",
-            advice,
-            farther,
+            f" {links_text(pairs, between, table=table)}"
         )
+        depth = pairs[0].depth
+        if table:
+            advice = to_leave_the_table(one.name, self._layout[one.name], overlaps[0])
+            return Finding("table", True, between[:1], pairs, depth, "m", what, advice)
+        advice, farther = to_stand_apart(self._layout, one, other)
+        return Finding("collision", True, between, pairs, depth, "m", what, advice, farther)
 
     def _narrow(self, one: Postures, other: Postures, near: Approach) -> Finding:
-        first, second = near.links
-        return Finding(
-            "clearance",
-            False,
-            (one.name, other.name),
-            (),
-            near.distance,
-            "m",
-            f"{one.name}.{first} comes within {length_text(near.distance)} of"
-            f" {other.name}.{second}",
-            *to_stand_apart(self._layout, one, other),
+        between, (first, second) = (one.name, other.name), near.links
+        what = (
+            f"{one.name}.{first} comes within {length_text(near.distance)} of {other.name}.{second}"
         )
+        advice, farther = to_stand_apart(self._layout, one, other)
+        return Finding("clearance", False, between, (), near.distance, "m", what, advice, farther)
 
     def _when(self, overlaps: list[Approach]) -> str:
         """Say in which postures: at the keyframes, or only with joint noise."""
@@ -276,38 +247,41 @@ class _Check:
 
     def _workspaces(self) -> dict[str, Workspace]:
         spaces: dict[str, Workspace] = {}
-        for name, robot in self._arms():
+        for name, arm in self._arms.items():
             self._progress.tell(f"workspace of {name}")
-            arm = self._layout.arm(name).robot
-            placed = self._checked[robot]
-            base, model = placed.base_pose, self._models[robot]
-            spaces[name] = Workspace(base, placed.robot, model, arm)
-        return {name: space for name, space in spaces.items() if space.sampled}
+            space = Workspace(arm, arm.base)
+            spaces.update({name: space} if space.sampled else {})
+        return spaces
 
     def _reaches(self) -> Iterator[TargetReach]:
-        for name, robot in self._arms() if self._targets else ():
-            arm = self._arm(name)
+        for name, arm in self._arms.items():
+            start = np.array(arm.placement.start_qpos)
             for target, numbers in self._targets.items():
                 self._progress.tell(f"{name} to {target}")
-                quaternion = np.array(numbers[3:]) if len(numbers) == 7 else None
-                solutions = arm.solve(np.array(numbers[:3]), quaternion)
-                solved = [s for s in solutions if s.solved]
-                free = next((s for s in solved if not any(self._obstacles(robot, s))), None)
-                best = free or solutions[0]
+                found = arm.solve([numbers])
+                ranked = found.ranked(start)
+                solved = [row for row in ranked if found.solved[row]]
+                touching_nothing = (
+                    row for row in solved if not any(self._obstacles(arm.owner, found.qpos[row]))
+                )
+                free = next(touching_nothing, None)
+                best = ranked[0] if free is None else free
+                blocked = bool(solved) and free is None
+                obstacles = self._obstacles(arm.owner, found.qpos[best]) if blocked else ()
                 yield TargetReach(
                     target,
                     name,
                     free is not None,
-                    best.missing,
-                    best.turn_missing,
-                    tuple(self._obstacles(robot, best)) if solved and free is None else (),
-                    best.qpos,
+                    float(found.missing[best]),
+                    float(found.turn_missing[best]),
+                    tuple(obstacles),
+                    tuple(found.qpos[best].tolist()),
                 )
 
-    def _obstacles(self, name: str, solution: Solution) -> Iterator[str]:
+    def _obstacles(self, name: str, qpos: Floats) -> Iterator[str]:
         """Yield what a robot touches there, itself included, with the others at their keyframes."""
         model = self._models[name]
-        robot = stand(name, self._layout[name].base_pose, model, np.array([solution.qpos]))
+        robot = stand(name, self._layout[name].base_pose, model, qpos[None])
         around = {**self._robots, **self._surfaces}
         for obstacle, body in around.items():
             if obstacle == name:
@@ -324,47 +298,13 @@ class _Check:
             if any(reach.reached for reach in own):
                 continue
             best = min(own, key=lambda reach: (not reach.blocked, reach.missing))
-            turned = len(numbers) == 7 and not best.blocked and self._gets_to(best.robot, numbers)
+            turned = False
+            if len(numbers) == 7 and not best.blocked:  # perhaps its place can be reached
+                turned = bool(self._arms[best.robot].solve([numbers[:3]]).solved.any())
             what = f"no robot reaches {target}{' without a collision' * best.blocked}"
-            yield Finding(
-                "target",
-                True,
-                (best.robot,),
-                (),
-                best.missing,
-                "m",
-                f"{what}; {reach_text(best)}",
-                to_be_reached(target, best, otherwise_turned=turned),
-            )
-
-    def _gets_to(self, name: str, target: tuple[float, ...]) -> bool:
-        """Tell whether a robot reaches the place of a target, however turned."""
-        return self._arm(name).solve(np.array(target[:3]), None)[0].solved
-
-    def _arms(self) -> Iterator[tuple[str, str]]:
-        """Yield the arms of the robots that can be checked, each with its robot."""
-        for name in self._layout.arms:
-            robot = self._layout.owner(name)
-            if robot in self._checked:
-                yield name, robot
-
-    def _arm(self, name: str) -> Reach:
-        robot = self._layout.owner(name)
-        return Reach(self._layout[robot], self._models[robot], self._layout.arm(name).robot)
-
-
-def noisy_postures(placement: Placement, draws: int, random: np.random.Generator) -> Floats:
-    """Return the keyframe, then draws with joint noise as at a reset, (1 + draws, dof)."""
-    groups = placement.robot.action_split.groups.values()
-    noisy = [group.reset_noise for group in groups for _ in group.joints]
-    noise = random.normal(0.0, placement.qpos_noise, (draws, len(noisy))) * noisy
-    return np.array(placement.start_qpos) + np.concatenate([np.zeros((1, len(noisy))), noise])
-
-
-def moving_hulls(model: RobotModel) -> list[tuple[int, int]]:
-    """Pair with the table's one hull all hulls of links that move; the base stands on it."""
-    bodies = model.kinematics.bodies
-    return [(i, 0) for i, hull in enumerate(model.hulls) if bodies[hull.link] != 0]
+            what = f"{what}; {reach_text(best)}"
+            advice = to_be_reached(target, best, otherwise_turned=turned)
+            yield Finding("target", True, (best.robot,), (), best.missing, "m", what, advice)
 
 
 def _worst(overlaps: Sequence[Approach]) -> tuple[LinkPair, ...]:
@@ -389,3 +329,41 @@ def _outline(robot: Postures) -> tuple[tuple[Point, ...], ...]:
         tuple(map(tuple, (hull.corners @ pose[:3, :3].T + pose[:3, 3]).tolist()))
         for hull, pose in zip(robot.hulls, robot.poses[0], strict=True)
     )
+
+
+def named_targets(targets: Targets) -> dict[str, tuple[float, ...]]:
+    """Return targets by name; those in a list are called by their number.
+
+    Raises:
+        LayoutError: If one is no place, or they come neither by name nor in order.
+    """
+    if isinstance(targets, str) or not isinstance(targets, Iterable):
+        raise LayoutError(
+            f"targets is {shown(targets)}; it takes places by name or in order:"
+            " {'cube': (0.4, 0.0, 0.1)}, in m"
+        )
+    named = (
+        dict(targets)
+        if isinstance(targets, Mapping)
+        else {f"target {i}": target for i, target in enumerate(targets, start=1)}
+    )
+    return {name: _target(name, numbers) for name, numbers in named.items()}
+
+
+def _target(name: str, numbers: Sequence[float]) -> tuple[float, ...]:
+    try:
+        target = tuple(float(x) for x in numbers)
+    except (TypeError, ValueError):
+        target = ()
+    if len(target) not in (3, 7) or not all(math.isfinite(x) for x in target):
+        raise LayoutError(
+            f"target {name!r} is {numbers!r}; it takes x, y, z (m), or these and w, x, y, z of the"
+            " TCP's orientation"
+        )
+    length = math.hypot(*target[3:])
+    if target[3:] and abs(length - 1) > 1e-3:
+        raise LayoutError(
+            f"the quaternion {target[3:]} of target {name!r} has length {length:.4g}; a rotation"
+            " has length 1 (order w, x, y, z)"
+        )
+    return (*target[:3], *(x / length for x in target[3:]))

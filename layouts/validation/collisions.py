@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts.frames import Pose
+from layouts.placement import Placement
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
 from robots.bodies.depth import overlap
-from robots.bodies.hulls import Hull, RobotModel
+from robots.bodies.hulls import Hull, RobotModel, convex_hull
 
 Pairs = NDArray[np.intp]  # (n, 2): indices of hulls
 
@@ -106,6 +107,34 @@ def stand(name: str, base: Pose, model: RobotModel, qpos: Floats) -> Postures:
     carriers = [hull.link for hull in model.hulls]
     names = tuple([model.kinematics.links[link] for link in carriers])
     return _postures(name, model.hulls, names, links[:, carriers])
+
+
+def noisy_postures(placement: Placement, draws: int, random: np.random.Generator) -> Floats:
+    """Return the keyframe, then draws with joint noise as at a reset, (1 + draws, dof)."""
+    groups = placement.robot.action_split.groups.values()
+    noisy = [group.reset_noise for group in groups for _ in group.joints]
+    noise = random.normal(0.0, placement.qpos_noise, (draws, len(noisy))) * noisy
+    return np.array(placement.start_qpos) + np.concatenate([np.zeros((1, len(noisy))), noise])
+
+
+def moving_hulls(model: RobotModel) -> list[tuple[int, int]]:
+    """Pair with the table's one hull all hulls of links that move; the base stands on it."""
+    bodies = model.kinematics.bodies
+    return [(i, 0) for i, hull in enumerate(model.hulls) if bodies[hull.link] != 0]
+
+
+def slab_hull(top: Floats, depth: float, name: str) -> Hull:
+    """Return what lies below a flat top, as a body of its own in the world frame.
+
+    Args:
+        top: Its corners, (n, 3) (m).
+        depth: How far it goes down (m).
+        name: Its name, for errors.
+
+    Raises:
+        AssetError: If it has no volume.
+    """
+    return convex_hull(0, np.concatenate([top, top - [0.0, 0.0, depth]]), name)
 
 
 def fixed(name: str, hull: Hull, postures: int) -> Postures:

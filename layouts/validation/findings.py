@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from layouts.arrangement import Arrangement
 
 Point = tuple[float, ...]  # (3,) (m), world
 
-SPOKEN_LINKS = 3  # pairs of links that a finding names in its text
+LISTED_LINKS = 3  # pairs of links that a finding names in its text
 
 
 @dataclass(frozen=True)
@@ -131,43 +127,6 @@ class TargetReach:
         return bool(self.obstacles)
 
 
-@dataclass(frozen=True, eq=False)
-class Results:
-    """What a check of a layout found.
-
-    Attributes:
-        layout: The layout.
-        draws: How many postures with joint noise were looked at, besides the keyframes.
-        tables: Corners of each table's top (m), by name.
-        targets: Position of each target in the world (m).
-        findings: What is wrong, serious findings first.
-        clearances: Between robots, and between robots and tables; what is farther than 10 m
-            apart is left out.
-        shared: Workspaces that overlap; empty if they were not looked at.
-        workspaces: Volume of each robot's workspace (m³), to about a tenth; empty if they were not
-            looked at. A robot that slides for many metres is left out.
-        reaches: For each target and robot, whether it gets there.
-        outlines: For each robot the corners of its hulls at the keyframe, world (m); none for one
-            that could not be checked.
-    """
-
-    layout: Arrangement
-    draws: int
-    tables: dict[str, tuple[Point, ...]]
-    targets: dict[str, Point]
-    findings: tuple[Finding, ...]
-    clearances: tuple[Clearance, ...]
-    shared: tuple[SharedWorkspace, ...]
-    workspaces: dict[str, float]
-    reaches: tuple[TargetReach, ...]
-    outlines: dict[str, tuple[tuple[Point, ...], ...]]
-
-    @property
-    def ok(self) -> bool:
-        """Whether nothing serious was found."""
-        return not any(finding.serious for finding in self.findings)
-
-
 def length_text(metres: float) -> str:
     """Return a length as people write it: ``4.1 cm``, ``1.20 m``."""
     return f"{metres:.2f} m" if abs(metres) >= 1 else f"{metres * 100:.1f} cm"
@@ -178,7 +137,7 @@ def links_text(pairs: Sequence[LinkPair], between: tuple[str, str], *, table: bo
     one, other = between
     spoken = [
         f"{one}.{a} with {b if table else f'{other}.{b}'} ({length_text(pair.depth)})"
-        for pair in pairs[:SPOKEN_LINKS]
+        for pair in pairs[:LISTED_LINKS]
         for a, b in [pair.links]
     ]
     rest = len(pairs) - len(spoken)

@@ -1,101 +1,154 @@
-"""What a placed robot's tool centre point can reach: targets, and how much space."""
+"""What an arm's tool centre point can reach: targets, and how much space."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
-from layouts.frames import Pose
-from layouts.placement import Placement
+from layouts.arrangement import Arrangement
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
-from robot_layouts.kinematics.solve import Goal, scattered, solve
+from robot_layouts.kinematics.solve import ITERATIONS, Goal, Solutions, scattered, solve
 from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel
 from robots.descriptor import IDENTITY
 from robots.urdf.tcp import find_tcp
 
-STARTS = 24  # places that inverse kinematics starts from, besides the keyframes
-
+STARTS = 24  # joint positions that inverse kinematics starts from, besides the keyframes
 WORKSPACE_SAMPLES = 20_000  # joint positions
 VOXEL = 0.1  # m
+RADIAN = 0.25  # m; a turn of 1 rad counts like this distance
+DENSE = 4  # sampled postures near a place that show it to be well within reach
+PLACE_SPACING = 0.08  # m; between places that were sampled
+POSE_SPACING = 0.2  # m; the same of poses, turns included
 
 
-@dataclass(frozen=True)
-class Solution:
-    """What inverse kinematics found for one robot and target.
-
-    Attributes:
-        qpos: Joint positions in the descriptor's order (rad, m): the solution, or the posture
-            that comes nearest.
-        missing: How far the tool centre point stays from the target (m).
-        turn_missing: How far its orientation stays from the target's (rad); 0 if none was asked.
-        solved: Whether both are as good as zero.
-    """
-
-    qpos: tuple[float, ...]
-    missing: float
-    turn_missing: float
-    solved: bool
-
-
-class Reach:
-    """Inverse kinematics of one placed robot, or of a limb of it, from many starts.
+class Arm:
+    """A robot that is one arm, or a limb of a robot, wherever its base stands.
 
     Joints outside the arm stay at the placement's keyframe.
+
+    Attributes:
+        name: Its full name in the layout.
+        owner: The robot that it belongs to.
+        placement: That robot's placement.
+        own: The arm, described like a robot.
+        model: The robot's links and hulls.
+        joints: Indices of the arm's joints among the robot's.
     """
 
-    def __init__(
-        self, placement: Placement, model: RobotModel, arm: RobotDescriptor | None = None
-    ) -> None:
-        """Take a robot.
+    def __init__(self, layout: Arrangement, name: str, model: RobotModel) -> None:
+        """Take an arm of a layout.
 
         Args:
-            placement: Where it stands.
-            model: Its links.
-            arm: The limb, described like a robot; None for a robot that is one arm.
+            layout: The layout.
+            name: Full name of the arm.
+            model: The links and hulls of its robot.
+        """
+        self.name, self.owner, self.model = name, layout.owner(name), model
+        self.placement, self.own = layout[self.owner], layout.arm(name).robot
+        robot = self.placement.robot
+        self.joints = [robot.joints.index(joint) for joint in self.own.arm_joints]
+
+    @cached_property
+    def base(self) -> Floats:
+        """Pose of the robot's base in the world, (4, 4) (m)."""
+        pose = self.placement.base_pose
+        return pose_matrix(pose.position, pose.quaternion)
+
+    @cached_property
+    def starts(self) -> Floats:
+        """Joint positions that inverse kinematics starts from, (n, dof) (rad, m)."""
+        start, joints = np.array(self.placement.start_qpos), self.joints
+        limits = self.model.kinematics.limits[joints]
+        keyframes = np.array([start, *self.placement.robot.keyframes.values()])
+        qpos = np.tile(start, (len(keyframes) + STARTS, 1))
+        qpos[: len(keyframes), joints] = keyframes[:, joints]
+        qpos[len(keyframes) :, joints] = scattered(limits, STARTS)
+        qpos[:, joints] = np.clip(qpos[:, joints], limits[:, 0], limits[:, 1])
+        return qpos
+
+    def solve(
+        self,
+        targets: Sequence[tuple[float, ...]],
+        *,
+        base: Floats | None = None,
+        starts: Floats | None = None,
+        iterations: int = ITERATIONS,
+    ) -> Solutions:
+        """Bring the TCP to targets by inverse kinematics, from several joint positions each.
+
+        Args:
+            targets: Places of the TCP in the world (m), all with the TCP link's wxyz orientation
+                or all without.
+            base: Pose of the robot's base in the world, (4, 4) (m); by default the placement's.
+            starts: Joint positions for each target, (targets, n, dof) (rad, m); by default
+                `starts`.
+            iterations: How many steps to take at most.
+
+        Returns:
+            The solutions, in rows target by target.
 
         Raises:
             UnknownNameError: If the robot has no such TCP links.
         """
-        robot, arm = placement.robot, arm or placement.robot
-        self._kinematics = model.kinematics
-        self._base = pose_matrix(placement.base_position, placement.base_quaternion)
-        self._start = np.array(placement.start_qpos)
-        self._arm = [robot.joints.index(joint) for joint in arm.arm_joints]
-        self._tcp = find_tcp(arm, model.kinematics)
-        self._starts = arm_starts(robot, placement, model, self._arm)
+        base = self.base if base is None else base
+        if starts is None:
+            starts = np.stack([self.starts] * len(targets))
+        tcp = find_tcp(self.own, self.model.kinematics)
+        local = np.stack([_local(base, target) for target in targets])
+        local = np.repeat(local, starts.shape[1], axis=0)
+        goal = Goal(
+            local[:, :3, 3],
+            tcp.links,
+            local[:, :3, :3] if len(targets[0]) == 7 else None,
+            tcp.turned,
+            tcp.offset if tcp.offset.any() else None,
+        )
+        rows = starts.reshape(-1, starts.shape[-1])
+        return solve(self.model.kinematics, goal, rows, self.joints, iterations)
 
-    def solve(self, position: Floats, quaternion: Floats | None = None) -> list[Solution]:
-        """Return the solutions for a target, the nearest to the keyframe first.
+    def beyond(self, bases: Floats, target: tuple[float, ...]) -> Floats:
+        """Return about how far a target is beyond reach (m), turns included; 0 where it is not.
 
-        If there is none, the list holds the one posture that comes nearest.
+        By the nearest of the sampled poses, so that what is well within reach stands out.
 
         Args:
-            position: Of the tool centre point in the world, (3,) (m).
-            quaternion: Of the TCP link in the world, wxyz, or None if any will do.
+            bases: Poses of the base, (n, 4, 4).
+            target: Place of the TCP in the world, perhaps with its wxyz orientation.
         """
-        pose = pose_matrix(position, IDENTITY if quaternion is None else quaternion)
-        target = np.linalg.inv(self._base) @ pose
-        rotation = None if quaternion is None else target[:3, :3]
-        tcp = self._tcp
-        offset = tcp.offset if tcp.offset.any() else None
-        goal = Goal(target[:3, 3], tcp.links, rotation, tcp.turned, offset)
-        found = solve(self._kinematics, goal, self._starts, self._arm)
-        return [
-            Solution(
-                tuple(found.qpos[i].tolist()),
-                float(found.missing[i]),
-                float(found.turn_missing[i]),
-                bool(found.solved[i]),
-            )
-            for i in found.ranked(self._start)
-        ]
+        local = _local(bases, target)
+        if len(target) == 3:
+            distances, _ = self._places.query(local[:, :3, 3], k=DENSE)
+            return np.maximum(distances[:, -1] - PLACE_SPACING, 0.0)
+        distances, _ = self._poses.query(_features(local[:, :3, 3], local[:, :3, :3]), k=2)
+        return np.maximum(distances[:, -1] - POSE_SPACING, 0.0)
+
+    @property
+    def sampled_poses(self) -> tuple[Floats, Floats]:
+        """Where random joint positions bring the TCP, in the base's frame.
+
+        Places, (`WORKSPACE_SAMPLES`, 3) (m), and the TCP link's orientations, (…, 3, 3).
+        """
+        return _sampled_poses(self.placement.robot, self.model, self.own)
+
+    @cached_property
+    def _places(self) -> Any:
+        from scipy.spatial import KDTree
+
+        return KDTree(self.sampled_poses[0])
+
+    @cached_property
+    def _poses(self) -> Any:
+        from scipy.spatial import KDTree
+
+        return KDTree(_features(*self.sampled_poses))
 
 
 class Workspace:
-    """Which cells of a grid in the world a robot's tool centre point gets into.
+    """Which cells of a grid in the world an arm's tool centre point gets into.
 
     Found by forward kinematics of `WORKSPACE_SAMPLES` random joint positions within the limits;
     collisions are not looked at. Cells are cubes of `VOXEL`.
@@ -107,17 +160,10 @@ class Workspace:
             many metres.
     """
 
-    def __init__(
-        self,
-        base: Pose,
-        robot: RobotDescriptor,
-        model: RobotModel,
-        arm: RobotDescriptor | None = None,
-    ) -> None:
-        """Sample the workspace of a robot with its base there; see `Reach`."""
-        pose = pose_matrix(base.position, base.quaternion)
-        points, _ = sampled_poses(robot, model, arm or robot)
-        cells = np.floor((points @ pose[:3, :3].T + pose[:3, 3]) / VOXEL).astype(np.int64)
+    def __init__(self, arm: Arm, base: Floats) -> None:
+        """Sample the workspace of an arm whose robot's base is at a pose, (4, 4) (m)."""
+        points, _ = arm.sampled_poses
+        cells = np.floor((points @ base[:3, :3].T + base[:3, 3]) / VOXEL).astype(np.int64)
         self.cells = np.unique(cells @ np.array([1 << 40, 1 << 20, 1]))
         self.volume = len(self.cells) * VOXEL**3
         self.sampled = len(self.cells) < len(points) / 2
@@ -128,43 +174,24 @@ class Workspace:
 
 
 @lru_cache(maxsize=64)
-def sampled_poses(
+def _sampled_poses(
     robot: RobotDescriptor, model: RobotModel, own: RobotDescriptor
 ) -> tuple[Floats, Floats]:
-    """Return where random joint positions bring a tool centre point, in the base's frame.
-
-    Args:
-        robot: The robot.
-        model: Its links.
-        own: The robot again, or a limb of it, described like a robot.
-
-    Returns:
-        Places, (`WORKSPACE_SAMPLES`, 3) (m), and the TCP link's orientations, (…, 3, 3).
-    """
     arm = [robot.joints.index(joint) for joint in own.arm_joints]
-    start = np.array(robot.keyframe(robot.home.keyframe))
-    qpos = np.tile(start, (WORKSPACE_SAMPLES, 1))
+    qpos = np.tile(np.array(robot.keyframe(robot.home.keyframe)), (WORKSPACE_SAMPLES, 1))
     qpos[:, arm] = scattered(model.kinematics.limits[arm], WORKSPACE_SAMPLES)
     tree = model.kinematics.towards(find_tcp(own, model.kinematics).needed)
     tcp, poses = find_tcp(own, tree), tree.forward(qpos)
     return tcp.places(poses), poses[:, tcp.turned, :3, :3].copy()
 
 
-def arm_starts(
-    robot: RobotDescriptor, placement: Placement, model: RobotModel, arm: list[int]
-) -> Floats:
-    """Return the joint positions that inverse kinematics starts from, (n, dof) (rad, m).
+def _features(places: Floats, rotations: Floats) -> Floats:
+    """Return poses as points whose distances count shifts and turns, (n, 12) (m)."""
+    turns = rotations.reshape(-1, 9) * (RADIAN / np.sqrt(2))
+    return np.concatenate([places, turns], axis=1)
 
-    Args:
-        robot: The robot.
-        placement: From whose keyframe the joints outside the arm are.
-        model: Its links.
-        arm: Indices of the arm's joints.
-    """
-    keyframes = [placement.start_qpos, *robot.keyframes.values()]
-    qpos = np.tile(np.array(placement.start_qpos), (len(keyframes) + STARTS, 1))
-    qpos[: len(keyframes), arm] = np.array(keyframes)[:, arm]
-    qpos[len(keyframes) :, arm] = scattered(model.kinematics.limits[arm], STARTS)
-    limits = model.kinematics.limits[arm]
-    qpos[:, arm] = np.clip(qpos[:, arm], limits[:, 0], limits[:, 1])
-    return qpos
+
+def _local(bases: Floats, target: tuple[float, ...]) -> Floats:
+    """Return a target in the frames of some bases, (…, 4, 4)."""
+    pose = pose_matrix(np.array(target[:3]), np.array(target[3:] or IDENTITY))
+    return np.linalg.inv(bases) @ pose

@@ -53,7 +53,7 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class LinkContact:
     """Two links that overlap.
 
     Attributes:
@@ -143,7 +143,7 @@ class Cell:
         """
         return self.models[name].kinematics.forward(np.array([qpos]))[0]
 
-    def contacts(self, qpos: Mapping[str, Floats]) -> list[Contact]:
+    def contacts(self, qpos: Mapping[str, Floats]) -> list[LinkContact]:
         """Return where robots overlap, with each other or with themselves, the deepest first.
 
         Args:
@@ -158,7 +158,7 @@ class Cell:
             pairs = self.models[one].self_pairs if one == other else None
             for approach in touching(standing[one], standing[other], pairs):
                 deepest.setdefault(((one, other), approach.links), -approach.distance)
-        found = [Contact(robots, links, depth) for (robots, links), depth in deepest.items()]
+        found = [LinkContact(robots, links, depth) for (robots, links), depth in deepest.items()]
         return sorted(found, key=lambda contact: -contact.depth)
 
 

@@ -1,21 +1,26 @@
-"""The panel of a page: sliders, what is shown, the timeline."""
+"""A page with a panel of sliders, served; or one without, saved as a file that needs no server."""
 
 from __future__ import annotations
 
+import html
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Event, RLock
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts.viewer.cell import Cell, Contact, Motion
-from layouts.viewer.guard import is_loopback
-from layouts.viewer.scene import OVERLAYS, Scene
-from layouts.viewer.server import serving
-from layouts.viewer.text import Text, printable
+from layouts.viewer.cell import Cell, LinkContact, Motion
+from layouts.viewer.guard import is_loopback, policy
+from layouts.viewer.scene import OVERLAYS, CellScene
+from layouts.viewer.server import ViewerError, serving
+from layouts.viewer.text import Text, as_html, printable
+from robot_layouts.core.commands import LOOPBACK
+from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.rotations import Floats
 from robots import JointGroup
 
@@ -30,6 +35,13 @@ LABELS = {
     "reach sphere": "Reach, sphere",
     "collision": "Collision shapes",
 }
+
+NO_SLIDERS = "A saved page has no sliders for joints; without --html, view serves one that has."
+NOTE_STYLE = (  # above the bar that plays a motion
+    "position: fixed; left: 0.75rem; bottom: 4.5rem; z-index: 1000; max-width: 24rem;"
+    " padding: 0.5rem 0.75rem; border-radius: 0.25rem; background: #fffd; color: #222;"
+    " box-shadow: 0 0 4px #0004; font: 0.8rem/1.4 sans-serif; overflow-wrap: anywhere"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +62,7 @@ class _Driven:
         return (first - offsets[0]) / multipliers[0] * multipliers + offsets
 
 
-class Page:
+class CellPage:
     """A cell with its panel, on a viser server."""
 
     def __init__(self, server: Any, cell: Cell) -> None:
@@ -66,7 +78,7 @@ class Page:
         self._stale.set()
         self._qpos = {name: start.copy() for name, start in cell.start.items()}
         server.scene.set_up_direction("+z")
-        self.scene = Scene(server.scene, cell)
+        self.scene = CellScene(server.scene, cell)
         self.scene.aim(server.initial_camera)
         self._sliders: dict[str, list[tuple[Any, _Driven]]] = {}
         self._timeline: Any = None
@@ -203,7 +215,7 @@ def serve(cell: Cell, host: str, port: int, announce: Callable[[str], None]) -> 
         ViewerError: If the port is in use, or the address is none of this machine's.
     """
     with serving(host, port, cell.title) as (server, address):
-        page = Page(server, cell)
+        page = CellPage(server, cell)
         tell(cell.title, host, address, announce)
         before = time.monotonic()
         while True:
@@ -230,7 +242,7 @@ def tell(title: str, host: str, address: str, announce: Callable[[str], None]) -
     announce(f"{title}: {address} (Ctrl-C ends it)")
 
 
-def contacts_text(contacts: list[Contact]) -> str:
+def contacts_text(contacts: list[LinkContact]) -> str:
     """Say which links overlap."""
     if not contacts:
         return "No robot touches another or itself."
@@ -241,3 +253,71 @@ def contacts_text(contacts: list[Contact]) -> str:
     ]
     rest = len(contacts) - len(lines)
     return "\n".join([*lines, *([f"- and {rest} more"] if rest else [])])
+
+
+def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
+    """Save a page as one file that needs no server and fetches nothing.
+
+    It has no sliders for joints, and says so: robots stand as they start, or play the motion. What
+    is shown can be chosen in its scene tree.
+
+    Args:
+        cell: What to show.
+        path: Where to save; must end in ``.html``.
+
+    Raises:
+        MissingPackageError: If viser is not installed.
+        ViewerError: If the path ends otherwise, nothing can be written there, or the page of this
+            version of viser is of another make.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in (".html", ".htm"):
+        raise ViewerError(f"cannot save a page as {target.name!r}; the name must end in .html")
+    with serving(LOOPBACK, 0, cell.title) as (server, _):
+        page = _recorded(server, cell).as_html()
+    page = _with(page, "<title>Viser</title>", f"<title>{html.escape(cell.title)}</title>")
+    rules = f'<meta http-equiv="Content-Security-Policy" content="{html.escape(policy())}">'
+    page = _with(page, "<head>", f"<head>\n{rules}")
+    page = _with(page, '<div id="root"></div>', f'<div id="root"></div>\n{_note(cell)}')
+    write_whole(target, page, ViewerError)
+    return target
+
+
+def _recorded(server: Any, cell: Cell) -> Any:
+    """Draw a cell, and return viser's recording of it."""
+    server.scene.set_up_direction("+z")
+    scene = CellScene(server.scene, cell)
+    scene.aim(server.initial_camera)
+    scene.mark(cell.contacts(cell.start))
+    recording = server.get_scene_serializer()
+    if (motion := cell.motion) is not None:
+        for moment in range(len(motion)):
+            qpos = {name: np.asarray(rows[moment]) for name, rows in motion.qpos.items()}
+            for name, positions in qpos.items():
+                scene.pose(name, positions)
+            for name, rows in motion.poses.items():
+                scene.place(name, rows[moment])
+            scene.mark(cell.contacts(qpos))
+            recording.insert_sleep(motion.step_seconds)
+    return recording
+
+
+def _note(cell: Cell) -> str:
+    """Return what the panel of a served page says, as far as it holds without sliders."""
+    start = "Where the robots start:\n" + contacts_text(cell.contacts(cell.start))
+    paragraphs = "".join(f"<p>{as_html(text)}</p>" for text in (*cell.notes, start, NO_SLIDERS))
+    return (
+        f'<details open style="{NOTE_STYLE}"><summary><b>{as_html(cell.title)}</b></summary>'
+        f"{paragraphs}</details>"
+    )
+
+
+def _with(page: str, old: str, new: str) -> str:
+    """Put something in the place of a part of viser's page.
+
+    Raises:
+        ViewerError: If the page does not have that part once.
+    """
+    if page.count(old) != 1:
+        raise ViewerError(f"a page of this version of viser has {old} {page.count(old)} times")
+    return page.replace(old, new)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from layouts.frames import table_outlines
-from layouts.preview import COLOURS
-from layouts.viewer.cell import Cell, Contact, Thing
+from layouts.viewer.cell import Cell, LinkContact, Thing
 from layouts.viewer.text import node
 from layouts.visuals import Part, coarse, simplified
+from robot_layouts.core.figures import COLOURS
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robots.urdf.tree import link_index
 
@@ -33,7 +33,7 @@ CIRCLE_POINTS = 97
 LIFT = 0.002  # m, of what lies on the floor
 
 
-class Scene:
+class CellScene:
     """A cell drawn on a viser server.
 
     Nodes are called ``/ROBOT/OVERLAY/…``, ``/(things)/NAME``, ``/(tables)/NAME`` and
@@ -113,7 +113,7 @@ class Scene:
         """Show or hide the lines of the cell."""
         self._ways.visible = visible
 
-    def mark(self, contacts: Sequence[Contact]) -> None:
+    def mark(self, contacts: Sequence[LinkContact]) -> None:
         """Show the links that overlap in red, and only those."""
         red = {end for c in contacts for end in zip(c.robots, c.links, strict=True)}
         for end, handle in self._touching.items():

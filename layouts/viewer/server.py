@@ -13,8 +13,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, redirect_stdout
 from typing import Any, NamedTuple
 
-from layouts.viewer.guard import Guard, is_wildcard
-from layouts.viewer.messages import MESSAGE_BYTES, fits
+from layouts.viewer.guard import MESSAGE_BYTES, Guard, fits, is_wildcard
 from robots import MissingPackageError, RobotLayoutsError
 
 LAST_PORT = 65535

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robot_layouts.core.errors import MissingPackageError
+from robot_layouts.core.errors import MissingPackageError, RobotLayoutsError
+from robot_layouts.core.writing import written_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -38,3 +42,32 @@ def blank_figure(
             f"{what} needs matplotlib: pip install 'robot-layouts[preview]'"
         ) from error
     return Figure(figsize=size, dpi=dots_per_inch, facecolor="white")
+
+
+def save_figure(
+    drawn: Callable[[], Figure],
+    path: str | os.PathLike[str],
+    what: str,
+    error: type[RobotLayoutsError],
+) -> Path:
+    """Save a figure, whole or not at all, and return its path.
+
+    Args:
+        drawn: Draws it; called if the name will do.
+        path: Where to save; the ending chooses the format (.png, .pdf or .svg).
+        what: What it is, for the message.
+        error: What is raised.
+
+    Raises:
+        RobotLayoutsError: If the ending names no supported format.
+    """
+    target = Path(path)
+    if target.suffix.lower() not in SUPPORTED:
+        raise error(
+            f"cannot save a {what} as {target.name!r}; the name must end in"
+            f" {', '.join(SUPPORTED[:-1])} or {SUPPORTED[-1]}"
+        )
+    figure = drawn()
+    with written_whole(target) as unfinished:
+        figure.savefig(unfinished, format=target.suffix[1:].lower())
+    return target

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from layouts import Layout
-from layouts.validation.arguments import Rectangle
+from layouts.frames import Rectangle
 from layouts.validation.findings import length_text
 from robot_layouts.core.bounds import FAR, checked_number
 from robot_layouts.core.errors import MotionError

@@ -6,7 +6,7 @@ import inspect
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any
 
-from layouts.display import layout_html
+from layouts.preview import layout_html
 from robots import RobotDescriptor
 from robots.display import heading, table
 

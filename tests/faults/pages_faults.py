@@ -68,7 +68,7 @@ def _serve_unguarded(_: Path) -> None:
 
 
 def _save(folder: Path, name: str) -> None:
-    from layouts.viewer.saved import save_html
+    from layouts.viewer.page import save_html
 
     (folder / "folder.html").mkdir()
     (folder / "file").write_text("")

@@ -81,7 +81,7 @@ def _plain(message: dict[str, Any]) -> str:
 
 
 def _saved_name(folder: Path, name: str) -> str:
-    from layouts.viewer.saved import NO_SLIDERS, save_html
+    from layouts.viewer.page import NO_SLIDERS, save_html
     from layouts.viewer.text import printable
     from tests.layouts.guests import small_cell
 

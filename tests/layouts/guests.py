@@ -16,7 +16,7 @@ from websockets.sync.client import connect
 
 from layouts import single
 from layouts.viewer import Cell
-from layouts.viewer.page import Page
+from layouts.viewer.page import CellPage
 from layouts.viewer.server import serving
 from robots import RobotDescriptor
 from tests.layouts.small_robots import FOLDING, robot
@@ -53,7 +53,7 @@ class Site:
         address: What to open.
     """
 
-    page: Page
+    page: CellPage
     server: Any
     address: str
 
@@ -71,7 +71,7 @@ class Site:
 @contextmanager
 def site(cell: Cell, host: str = "127.0.0.1") -> Iterator[Site]:
     with serving(host, 0, cell.title) as (server, address):
-        page = Page(server, cell)
+        page = CellPage(server, cell)
         page.tick(0.0)
         yield Site(page, server, address)
 

@@ -12,7 +12,7 @@ import yourdfpy
 
 from layouts import Layout, Placement, around_table, single
 from layouts.export.cell import ExportedCell
-from layouts.export.names import Names
+from layouts.export.files import Names
 from robots import LayoutError
 from robots.bodies.hulls import load_model
 from tests.layouts.test_export_mjcf import small_cell

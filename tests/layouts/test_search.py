@@ -10,9 +10,8 @@ import layouts
 from layouts import ceiling, ring, search, table, wall
 from layouts.__main__ import main
 from layouts.layout import Layout
-from layouts.placing.coarse import grid_of_seats
-from layouts.placing.demands import demands_of
-from layouts.placing.sites import ground_of
+from layouts.placing.bases import ground_of
+from layouts.placing.cost import requirements_of
 from robots import LayoutError, MissingPackageError, RobotLayoutsError, RobotRegistry
 from tests.layouts.small_robots import robot
 
@@ -89,7 +88,7 @@ class TestWhoReaches:
         alone = ring({"torso": "baxter", "arm": "panda"})
         targets = {"a": (0, 0, 0), "b": (0, 0, 1), "c": (1, 0, 0), "d": (1, 1, 0)}
         by = {"a": "all", "b": ["arm", "right"], "c": "torso"}
-        arms = [(demand.target, demand.arms) for demand in demands_of(targets, by, alone)]
+        arms = [(asked.target, asked.arms) for asked in requirements_of(targets, by, alone)]
         left, right = "torso.left", "torso.right"
         assert arms == [
             *(("a", (arm,)) for arm in (left, right, "arm")),
@@ -186,10 +185,10 @@ class TestGround:
     def test_the_grid_lies_where_bases_may_stand(self, around, within):
         robots = {"arm": RobotRegistry.load("panda")}
         ground = ground_of(around, within, 0.0, robots, [(0.0, 0.0, 0.1)])
-        seats = grid_of_seats(ground.sites)
-        assert 100 < len(seats) < 2500
-        assert len(set(seats)) == len(seats)
-        assert all(ground.sites[seat.site].allows(seat.x, seat.y) for seat in seats)
+        bases = ground.grid()
+        assert 100 < len(bases) < 2500
+        assert len(set(bases)) == len(bases)
+        assert all(ground.surfaces[base.surface].allows(base.x, base.y) for base in bases)
 
     def test_frames_and_robots_may_not_share_a_name(self):
         with pytest.raises(LayoutError, match="'table' names both a robot and a frame"):

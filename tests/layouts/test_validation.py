@@ -548,7 +548,7 @@ class TestPicture:
         assert marked[1] == 0
 
     def test_it_says_names_clearance_targets_and_verdict(self):
-        from layouts.validation.picture import draw
+        from layouts.validation.report import draw
 
         layout = side_by_side(PANDAS, spacing=0.3)
         figure = draw(layout.validate(table=TABLE, targets={"cube": (0.4, 0, 0.1)}))
@@ -558,7 +558,7 @@ class TestPicture:
         assert plan.get_title(loc="right") == "ok"
 
     def test_no_word_covers_another_where_four_hands_meet(self):
-        from layouts.validation.picture import draw
+        from layouts.validation.report import draw
 
         layout = around_table({name: "panda" for name in "abcd"})
         figure = draw(layout.validate(workspaces=False))

@@ -14,9 +14,8 @@ from benchmarks.teleop import served
 from layouts import side_by_side, single
 from layouts.__main__ import main
 from layouts.viewer import Cell, Motion, Thing, ViewerError
-from layouts.viewer.cell import Contact
-from layouts.viewer.page import Page, contacts_text
-from layouts.viewer.saved import NO_SLIDERS, save_html
+from layouts.viewer.cell import LinkContact
+from layouts.viewer.page import NO_SLIDERS, CellPage, contacts_text, save_html
 from layouts.viewer.server import serving
 from layouts.visuals import MOST_TRIANGLES, coloured, read_visuals, simplified
 from robots import LayoutError, MissingPackageError, RobotRegistry
@@ -127,7 +126,7 @@ def test_the_page_shows_every_robot_and_overlay_at_the_posed_joints():
     layout = side_by_side({"a": "so100", "b": "so100"}, spacing=0.6)
     with serving("127.0.0.1", 0, "cell") as (server, _):
         cell = Cell("cell", layout)
-        page = Page(server, cell)
+        page = CellPage(server, cell)
         page.tick(0.0)
         nodes = server.scene._handle_from_node_name
         for overlay in ("meshes", "frames", "collision", "touching"):
@@ -156,7 +155,7 @@ def test_overlaps_are_named_and_marked():
         f"- a.{contacts[0].links[0]} in b.{contacts[0].links[1]}, {contacts[0].depth * 100:.1f} cm"
     )
     with serving("127.0.0.1", 0, "close") as (server, _):
-        page = Page(server, cell)
+        page = CellPage(server, cell)
         page.tick(0.0)
         nodes = server.scene._handle_from_node_name
         red = {n for n, handle in nodes.items() if "/touching/" in n and handle.visible}
@@ -168,7 +167,7 @@ def test_overlaps_are_named_and_marked():
 
 
 def test_many_overlaps_are_counted():
-    many = [Contact(("a", "b"), (f"link{i}", "tip"), 0.01) for i in range(9)]
+    many = [LinkContact(("a", "b"), (f"link{i}", "tip"), 0.01) for i in range(9)]
     assert contacts_text(many).splitlines()[-1] == "- and 3 more"
     assert contacts_text([]) == "No robot touches another or itself."
 
@@ -176,7 +175,7 @@ def test_many_overlaps_are_counted():
 def test_the_timeline_moves_robots_and_things():
     cell = make_cell(moments=5)
     with serving("127.0.0.1", 0, "arm") as (server, _):
-        page = Page(server, cell)
+        page = CellPage(server, cell)
         nodes = server.scene._handle_from_node_name
         page.go_to(3)
         assert nodes["/(things)/ball"].position[0] == pytest.approx(3)
@@ -247,7 +246,7 @@ def test_a_robot_without_visual_meshes_is_shown_by_its_collision_shapes(capsys, 
     assert len(cell.notes) == 1
     assert cell.notes[0].startswith("arm is shown by its collision shapes: ")
     with serving("127.0.0.1", 0, "pinch") as (server, _):
-        Page(server, cell)
+        CellPage(server, cell)
         nodes = server.scene._handle_from_node_name
         assert nodes["/arm/collision"].visible
         assert "/arm/meshes/panda_link0" not in nodes

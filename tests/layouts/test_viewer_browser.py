@@ -7,7 +7,7 @@ import viser
 
 from benchmarks.teleop import PATIENCE, SOFTWARE_WEBGL, running_browser, served
 from layouts.__main__ import main
-from layouts.viewer.saved import save_html
+from layouts.viewer.page import save_html
 from layouts.viewer.text import printable
 from tests.layouts.guests import site, small_cell
 from tests.layouts.hostile_names import HOSTILE_NAMES

@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 from layouts.viewer import ViewerError
 from layouts.viewer.guard import MOST_CLIENTS, REFUSAL, Guard
-from layouts.viewer.saved import NO_SLIDERS, save_html
+from layouts.viewer.page import NO_SLIDERS, save_html
 from layouts.viewer.server import serving
 from layouts.viewer.text import as_html, node, printable
 from tests.layouts.guests import (
@@ -365,7 +365,7 @@ def test_a_page_that_cannot_be_written_is_refused(where, tmp_path):
 
 
 def test_controls_are_told_apart_by_what_they_take(open_site):
-    from layouts.viewer.messages import fits
+    from layouts.viewer.guard import fits
 
     handles = open_site.server.gui._gui_input_handle_from_uuid
     takes = {}

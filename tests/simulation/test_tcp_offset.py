@@ -9,7 +9,7 @@ import pytest
 import sapien
 
 from layouts import Layout, Placement, single
-from layouts.validation.reach import Reach, Workspace
+from layouts.validation.reach import Arm, Workspace
 from robot_layouts.kinematics.rotations import rotate
 from robot_layouts.simulation import Simulation
 from robot_layouts.simulation.checks.overlaps import empty, stand
@@ -59,22 +59,20 @@ def test_inverse_kinematics_brings_it_where_it_was():
     np.testing.assert_allclose(reached, place + (0.05, 0.02, -0.04), atol=1e-3)
 
 
-@pytest.mark.parametrize("turned", [None, (0.0, 1.0, 0.0, 0.0)])
+@pytest.mark.parametrize("turned", [(), (0.0, 1.0, 0.0, 0.0)])
 def test_checks_bring_the_same_place_to_a_target(turned):
-    model = load_model(BESIDE)
-    target = np.array([0.3, 0.05, 0.3])
-    best = Reach(PLACEMENT, model).solve(target, turned)[0]
-    assert best.solved
-    world = BuiltWorld(Layout({"arm": PLACEMENT}))
-    place, _ = InverseKinematics(world, "arm").forward(np.array(best.qpos)[:7])
+    layout, target = Layout({"arm": PLACEMENT}), (0.3, 0.05, 0.3)
+    found = Arm(layout, "arm", load_model(BESIDE)).solve([(*target, *turned)])
+    best = found.ranked(np.array(PLACEMENT.start_qpos))[0]
+    assert found.solved[best]
+    place, _ = InverseKinematics(BuiltWorld(layout), "arm").forward(found.qpos[best, :7])
     np.testing.assert_allclose(place, target, atol=1.1e-3)
 
 
 def test_it_widens_the_workspace_and_is_moved_without_error():
     model = load_model(BESIDE)
-    volumes = [
-        Workspace(Placement(robot).base_pose, robot, model).volume for robot in (PANDA, BESIDE)
-    ]
+    arms = [Arm(Layout({"arm": Placement(r)}), "arm", model) for r in (PANDA, BESIDE)]
+    volumes = [Workspace(arm, arm.base).volume for arm in arms]
     assert volumes[1] > 1.02 * volumes[0]
     assert tcp_error(BESIDE) < 0.002
 

@@ -6,7 +6,7 @@ import pytest
 import tasks
 from benchmarks.teleop import served
 from layouts import single
-from layouts.viewer.saved import NO_SLIDERS, save_html
+from layouts.viewer.page import NO_SLIDERS, save_html
 from robot_layouts.kinematics.rotations import pose_matrix
 from robot_layouts.simulation import Box, Capsule, Cylinder, Sphere
 from robot_layouts.simulation.sapien3.world import BuiltWorld

@@ -6,15 +6,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from layouts.export.cell import ExportedCell, Inertial, RobotSource, Standing
+from layouts.export.cell import ExportedCell, RobotSource, Standing
 from layouts.export.meshes import MeshFolder, drawn_meshes, solid_shapes
-from layouts.export.ros2.names import WORLD, RosNames
+from layouts.export.ros2.groups import WORLD, RosNames
 from layouts.visuals import GREY, Rgba
 from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of
-from robots.urdf.model import ModelJoint
+from robots.urdf.model import Inertial, ModelJoint
 
-XACRO = "http://www.ros.org/wiki/xacro"
 SPEEDS = {"rad": 1.0, "m": 0.1}  # per second, of joints whose URDF has no largest speed
 
 Shapes = dict[str, list[Element]]
@@ -46,26 +45,6 @@ def description(
         SubElement(root, "link", name=link)
         pose = pose_matrix(tool.position, (1.0, 0.0, 0.0, 0.0))
         root.append(fixed(names.fixed_joint(link), names.link(tool.place, tool.link), link, pose))
-    return root
-
-
-def wrapper(package: str, systems: Sequence[Element]) -> Element:
-    """Return a xacro file that adds what drives the robots to their description.
-
-    Args:
-        package: The package.
-        systems: Its ``<ros2_control>``.
-    """
-    root = Element("robot", {"name": package, "xmlns:xacro": XACRO})
-    for system in systems:
-        SubElement(
-            root,
-            "xacro:arg",
-            name=f"{system.get('name')}_plugin",
-            default="mock_components/GenericSystem",
-        )
-    SubElement(root, "xacro:include", filename=f"{package}.urdf")
-    root.extend(systems)
     return root
 
 
@@ -156,7 +135,7 @@ def _limit(joint: ModelJoint, source: RobotSource) -> dict[str, str]:
 
 def _inertial(inertial: Inertial) -> Element:
     made = Element("inertial")
-    SubElement(made, "origin", xyz=_text(inertial.position.tolist()), rpy="0 0 0")
+    SubElement(made, "origin", xyz=_text(inertial.origin[:3, 3].tolist()), rpy="0 0 0")
     SubElement(made, "mass", value=repr(inertial.mass))
     keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     numbers = inertial.tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()

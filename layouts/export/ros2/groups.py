@@ -1,23 +1,69 @@
-"""Planning groups of a cell: of each arm, gripper and limb, of each place, and of all together."""
+"""Names of a cell in ROS 2, and its planning groups: of arms, grippers, limbs, places, and all."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from layouts.export.cell import ExportedCell, Tool
-from layouts.export.names import Names
-from layouts.export.ros2.names import RosNames
-from robots import RobotDescriptor
+from layouts.export.cell import ExportedCell, ToolPoint
+from layouts.export.files import Names
 from robots.action_split import is_gripper
 from robots.parts import BODY
-from robots.urdf.model import ModelJoint
 
+WORLD = "world"
 ALL = "all"
 
 
+class RosNames:
+    """Which name everything of a cell has; no two links, and no two joints, have the same.
+
+    Attributes:
+        frames: Of the layout's frames, as links.
+        systems: Of what drives the robot in each place.
+    """
+
+    def __init__(self, cell: ExportedCell) -> None:
+        """Name everything."""
+        links, joints = Names(r"\W"), Names(r"\W")
+        links.new(WORLD)
+        systems = Names(r"\W")
+        self.systems = {place: systems.new(place) for place in cell.robots}
+        self._links: dict[tuple[str, str], str] = {}
+        self._joints: dict[tuple[str, str], str] = {}
+        for place, standing in cell.robots.items():
+            for link in standing.source.model.links:
+                self._links[place, link] = links.new(f"{place}_{link}")
+            for joint in standing.source.model.joints:
+                self._joints[place, joint.name] = joints.new(f"{place}_{joint.name}")
+        self._tools = {tool.arm: links.new(f"{tool.arm}_tcp") for tool in cell.tools}
+        self.frames = {name: links.new(name) for name in cell.layout.frames}
+        roots = [self.link(n, standing.source.model.root) for n, standing in cell.robots.items()]
+        fixed = (*roots, *self._tools.values(), *self.frames.values())
+        self._fixed = {link: joints.new(f"{link}_fixed") for link in fixed}
+
+    def link(self, place: str, link: str) -> str:
+        """Return the name of a robot's link."""
+        return self._links[place, link]
+
+    def joint(self, place: str, joint: str) -> str:
+        """Return the name of a robot's joint."""
+        return self._joints[place, joint]
+
+    def tool(self, tool: ToolPoint) -> str:
+        """Return the name of the link at a tool centre point."""
+        return self._tools[tool.arm]
+
+    def fixed_joint(self, link: str) -> str:
+        """Return the name of the joint that fixes a root, a tool centre point or a frame.
+
+        Args:
+            link: Its name here.
+        """
+        return self._fixed[link]
+
+
 @dataclass(frozen=True)
-class Group:
+class PlanningGroup:
     """A planning group.
 
     Attributes:
@@ -26,7 +72,7 @@ class Group:
         joints: Joints of its own, by their names in the robot's URDF; empty if it is made of
             others. Those that follow another joint are among them.
         driven: Those of them that follow none.
-        groups: Groups that it is made of.
+        groups: PlanningGroups that it is made of.
         chain: First and last link of a chain of which all joints are its own, as ROS knows them.
         parent: Of a gripper the group that carries it, or empty.
         carrier: Of a gripper the link that carries it, as ROS knows it.
@@ -47,7 +93,7 @@ class Group:
         return f"{self.name}_controller"
 
 
-class Groups:
+class PlanningGroups:
     """The planning groups of a cell.
 
     Attributes:
@@ -59,25 +105,23 @@ class Groups:
         """Find them."""
         self._cell, self._names, self._taken = cell, names, Names(r"\W")
         self._tools = {tool.arm: tool for tool in cell.tools}
-        self.own: list[Group] = []
-        self.made: list[Group] = []
+        self.own: list[PlanningGroup] = []
+        self.made: list[PlanningGroup] = []
         wholes = {place: self._taken.new(place) for place in cell.robots}
         for place, whole in wholes.items():
             self._add_place(place, whole)
         if len(wholes) > 1:
-            self.made.append(Group(self._taken.new(ALL), "", groups=tuple(wholes.values())))
+            self.made.append(PlanningGroup(self._taken.new(ALL), "", groups=tuple(wholes.values())))
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of all."""
-        return tuple(group.name for group in (*self.own, *self.made))
+    def parts(self) -> dict[str, tuple[PlanningGroup, ...]]:
+        """The groups with joints of their own that each group is or is made of, by its name."""
+        parts: dict[str, tuple[PlanningGroup, ...]] = {group.name: (group,) for group in self.own}
+        for group in self.made:
+            parts[group.name] = tuple(part for name in group.groups for part in parts[name])
+        return parts
 
-    @property
-    def controllers(self) -> tuple[str, ...]:
-        """Names of the controllers, one for each group with joints of its own."""
-        return tuple(group.controller for group in self.own)
-
-    def joints(self, group: Group) -> list[str]:
+    def joints(self, group: PlanningGroup) -> list[str]:
         """Return the joints of a group's own that are driven, as ROS knows them."""
         return [self._names.joint(group.place, joint) for joint in group.driven]
 
@@ -89,29 +133,31 @@ class Groups:
             own = self._add_part(arm, place, f"{whole}_{limb}" if limb else whole)
             if limb and limb != BODY and own:
                 name = self._taken.new(f"{whole}_{limb}")
-                self.made.append(Group(name, place, groups=tuple(own)))
+                self.made.append(PlanningGroup(name, place, groups=tuple(own)))
                 own = [name]
             inside += own
-        self.made.append(Group(whole, place, groups=tuple(inside)))
+        self.made.append(PlanningGroup(whole, place, groups=tuple(inside)))
 
     def _add_part(self, part: str, place: str, prefix: str) -> list[str]:
         """Add what a robot or limb moves by itself, and return the names of its groups."""
         robot = self._cell.layout.parts[part].robot
-        arm, gripper = list(robot.arm_joints), _gripper_joints(robot)
-        added: list[Group] = []
+        arm, gripper = list(robot.arm_joints), list[str]()
+        for name, group in robot.action_split.groups.items():
+            if is_gripper(name) and not group.held:
+                gripper += group.joints
+        added: list[PlanningGroup] = []
         if arm:
             ending = "" if part.endswith(f".{BODY}") else "_arm"
             name = self._taken.new(f"{prefix}{ending}")
             chain = self._chain(self._tools.get(part), place, arm)
-            added.append(Group(name, place, *self._moved(place, arm), chain=chain))
+            added.append(PlanningGroup(name, place, *self._moved(place, arm), chain=chain))
         if gripper:
-            name, (joints, driven) = (
-                self._taken.new(f"{prefix}_gripper"),
-                self._moved(place, gripper),
-            )
+            name = self._taken.new(f"{prefix}_gripper")
+            joints, driven = self._moved(place, gripper)
             parent = added[0].name if added else ""
-            carrier = self._names.link(place, self._joint(place, joints[0]).parent)
-            added.append(Group(name, place, joints, driven, parent=parent, carrier=carrier))
+            parents = {j.name: j.parent for j in self._cell.robots[place].source.model.joints}
+            carrier = self._names.link(place, parents[joints[0]])
+            added.append(PlanningGroup(name, place, joints, driven, parent=parent, carrier=carrier))
         self.own += added
         return [group.name for group in added]
 
@@ -127,7 +173,7 @@ class Groups:
         return tuple(found), tuple(joint for joint in found if joint in driven)
 
     def _chain(
-        self, tool: Tool | None, place: str, joints: Sequence[str]
+        self, tool: ToolPoint | None, place: str, joints: Sequence[str]
     ) -> tuple[str, str] | None:
         """Return the ends of the chain that some joints make towards a tool, if they make one."""
         if tool is None:
@@ -136,24 +182,10 @@ class Groups:
         places = [i for i, joint in enumerate(path) if joint.name in joints]
         if not places or len(places) != len(joints):
             return None
-        between = path[places[0] : places[-1] + 1]
+        between, beyond = path[places[0] : places[-1] + 1], path[places[-1] + 1 :]
         if any(joint.moves and joint.name not in joints for joint in between):
             return None
-        last = between[-1].child
-        if all(not joint.moves for joint in path[places[-1] + 1 :]):
-            return self._names.link(place, between[0].parent), self._names.tool(tool)
-        return self._names.link(place, between[0].parent), self._names.link(place, last)
-
-    def _joint(self, place: str, name: str) -> ModelJoint:
-        joints: Iterator[ModelJoint] = iter(self._cell.robots[place].source.model.joints)
-        return next(joint for joint in joints if joint.name == name)
-
-
-def _gripper_joints(robot: RobotDescriptor) -> list[str]:
-    groups = robot.action_split.groups.items()
-    return [
-        joint
-        for name, group in groups
-        if is_gripper(name) and not group.held
-        for joint in group.joints
-    ]
+        first, last = (
+            self._names.link(place, link) for link in (between[0].parent, between[-1].child)
+        )
+        return first, last if any(joint.moves for joint in beyond) else self._names.tool(tool)

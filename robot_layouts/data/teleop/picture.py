@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from layouts.viewer.scene import COARSE, Scene
+from layouts.viewer.scene import COARSE, CellScene
 from robot_layouts.data.teleop.session import Session
 from robot_layouts.kinematics.rotations import Floats
 from tasks.view import live_thing, task_cell
@@ -33,7 +33,7 @@ class Picture:
         cell = task_cell(session.task, session.task.task_id)
         self.notes = cell.notes
         server.scene.set_up_direction("+z")
-        self._scene = Scene(server.scene, cell, drawn=("meshes", COARSE))
+        self._scene = CellScene(server.scene, cell, drawn=("meshes", COARSE))
         self.hurry = self._scene.hurry
         camera = server.initial_camera
         camera.fov = FIELD_OF_VIEW

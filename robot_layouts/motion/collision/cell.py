@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from layouts import Layout
-from layouts.validation.arguments import Rectangle
+from layouts.frames import Rectangle
 from robot_layouts.core.bounds import checked_number
 from robot_layouts.kinematics.rotations import inverse_pose
 from robot_layouts.motion.collision.checker import Checker

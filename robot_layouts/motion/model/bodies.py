@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from layouts import Layout
+from layouts.frames import TABLE_DEPTH, Rectangle, table_tops
 from layouts.placement import Placement
-from layouts.validation.arguments import Rectangle, table_tops
-from layouts.validation.check import TABLE_DEPTH
-from layouts.validation.slabs import slab_hull
+from layouts.validation.collisions import slab_hull
 from robot_layouts.core.bounds import FAR, checked_numbers, shown
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
 from robot_layouts.motion.model.obstacles import Held, Obstacle, Track
@@ -140,7 +139,7 @@ class Bodies:
         )
         self.tables = {
             name: slab_hull(np.array(top), TABLE_DEPTH, name)
-            for name, top in table_tops(layout, checked_table(table)).items()
+            for name, top in table_tops(layout.frame_poses, checked_table(table)).items()
         }
         self._check_names()
         self._part_of: dict[tuple[str, int], int] = {}

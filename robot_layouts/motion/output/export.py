@@ -12,8 +12,7 @@ import numpy as np
 import yaml
 
 from layouts.export.cell import ExportedCell
-from layouts.export.ros2.groups import Group, Groups
-from layouts.export.ros2.names import RosNames
+from layouts.export.ros2.groups import PlanningGroup, PlanningGroups, RosNames
 from robot_layouts.core.bounds import checked_number
 from robot_layouts.core.errors import MotionError
 from robot_layouts.core.new_files import write_new
@@ -49,7 +48,7 @@ def to_ros2(
     times = moments(motion, frequency)
     cell = ExportedCell.read(motion.layout, visuals=False)
     names = RosNames(cell)
-    groups = Groups(cell, names)
+    groups = PlanningGroups(cell, names)
     positions, velocities = motion.sample(times), motion.velocity(times)
     texts: dict[str, str] = {}
     for group in groups.own:
@@ -77,7 +76,7 @@ def moments(motion: TimedMotion, frequency: float | None) -> Floats:
     return np.append(times, motion.duration)
 
 
-def _columns(motion: TimedMotion, group: Group) -> list[int] | None:
+def _columns(motion: TimedMotion, group: PlanningGroup) -> list[int] | None:
     """Return where the joints of a group are among its robot's; None if one is not driven."""
     joints = motion.layout[group.place].robot.joints
     known = all(joint in joints for joint in group.driven)

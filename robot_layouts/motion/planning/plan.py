@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from layouts import Layout
-from layouts.validation.arguments import Rectangle
+from layouts.frames import Rectangle
 from robot_layouts.core.bounds import FAR, checked_number, checked_numbers, checked_whole, shown
 from robot_layouts.core.errors import MotionError, NoPlanError
 from robot_layouts.core.progress import Progress

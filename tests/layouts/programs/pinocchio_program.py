@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio
 
 from layouts.export.cell import ExportedCell
-from layouts.export.ros2.names import RosNames
+from layouts.export.ros2.groups import RosNames
 from robots.bodies.hulls import load_model
 from tests.layouts.travelling import EXACT, cells, draws
 

@@ -4,44 +4,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
-from layouts.frames import EDGES, Frame, Pose, resolve, table_outlines
+from layouts.frames import EDGES, Frame, Pose, Rectangle, resolve, table_outlines
 from layouts.placement import Placement, faced
+from layouts.placing import Around
 from robot_layouts.core.bounds import FAR, checked_number, checked_numbers, shown
 from robot_layouts.kinematics.quaternions import yaw_quaternion
-from robot_layouts.kinematics.rotations import pose_matrix
+from robot_layouts.kinematics.rotations import Floats, pose_matrix
 from robots import LayoutError, RobotDescriptor, UnknownNameError
 from robots.descriptor import IDENTITY, Vector3
 
-Rectangle = tuple[float, float, float, float]  # x_min, y_min, x_max, y_max (m)
-Around = Mapping[str, Frame] | Frame | Sequence[float]
-
 EDGE = 0.1  # m, from a table's edge, or a rectangle's, to a base's middle
 SIDEWAYS = math.pi / 2  # rad; how far robots at a table's edge turn away from its middle
+MOST_BASES = 1500  # on the grid, of one robot
+TURNS = 8  # in which a base on the grid may face, of a whole turn
 
 
 @dataclass(frozen=True)
-class Seat:
+class BasePose:
     """Where one base stands.
 
     Attributes:
-        site: Index of the site.
-        x: In the site's frame (m).
-        y: In the site's frame (m).
+        surface: Index of the surface that it stands on.
+        x: In the surface's frame (m).
+        y: In the surface's frame (m).
         yaw: Turn about the frame's z from the robot's home (rad).
     """
 
-    site: int
+    surface: int
     x: float
     y: float
     yaw: float
 
 
 @dataclass(frozen=True)
-class Site:
+class BaseSurface:
     """A plane that bases may stand on.
 
     Attributes:
@@ -50,7 +51,7 @@ class Site:
         low: Least x and y of a base in the frame (m).
         high: Greatest x and y.
         turns: Least and greatest yaw (rad).
-        free_of: A rectangle in the frame that bases keep out of, or None.
+        keep_out: A rectangle in the frame that bases keep out of, or None.
     """
 
     frame: str | None
@@ -58,55 +59,75 @@ class Site:
     low: tuple[float, float]
     high: tuple[float, float]
     turns: tuple[float, float] = (-math.pi, math.pi)
-    free_of: Rectangle | None = None
+    keep_out: Rectangle | None = None
 
     def allows(self, x: float, y: float) -> bool:
         """Tell whether a base may stand at a point of the frame (m)."""
         if not (self.low[0] <= x <= self.high[0] and self.low[1] <= y <= self.high[1]):
             return False
-        if self.free_of is None:
+        if self.keep_out is None:
             return True
-        x_min, y_min, x_max, y_max = self.free_of
+        x_min, y_min, x_max, y_max = self.keep_out
         return not (x_min < x < x_max and y_min < y < y_max)
-
-    def seat(self, number: int, x: float, y: float, yaw: float) -> Seat | None:
-        """Return a seat near some place, in whole mm and mrad; None if none may be there."""
-        if self.turns[1] - self.turns[0] >= 2 * math.pi:
-            yaw = math.remainder(yaw, 2 * math.pi)
-        yaw = min(max(yaw, self.turns[0]), self.turns[1])
-        x = min(max(round(x, 3), self.low[0]), self.high[0]) + 0.0
-        y = min(max(round(y, 3), self.low[1]), self.high[1]) + 0.0
-        return Seat(number, x, y, round(yaw, 3) + 0.0) if self.allows(x, y) else None
 
 
 @dataclass(frozen=True)
 class Ground:
-    """All sites, and the frames that they belong to.
+    """All surfaces, and the frames that they belong to.
 
     Attributes:
-        sites: Where bases may stand.
+        surfaces: Where bases may stand.
         frames: For the layout to hold.
-        heights: Of each robot's base above its site (m).
+        heights: Of each robot's base above its surface (m).
     """
 
-    sites: tuple[Site, ...]
+    surfaces: tuple[BaseSurface, ...]
     frames: Mapping[str, Frame]
     heights: Mapping[str, float]
 
-    def placement(
-        self, name: str, robot: RobotDescriptor, keyframe: str | None, seat: Seat
-    ) -> Placement:
-        """Return the placement of a robot in a seat, as a layout declares it."""
-        position, on = (seat.x, seat.y, self.heights[name]), self.sites[seat.site].frame
-        if robot.home.quaternion == IDENTITY:  # written as a turn, which people read more easily
-            return Placement(robot, position, keyframe=keyframe, rpy=(0.0, 0.0, seat.yaw), on=on)
-        return Placement(robot, position, faced(robot, yaw_quaternion(seat.yaw)), keyframe, on=on)
+    def base(self, number: int, x: float, y: float, yaw: float) -> BasePose | None:
+        """Return a base pose on a surface, in whole mm and mrad; None if it may not be there."""
+        surface = self.surfaces[number]
+        least, greatest = surface.turns
+        if greatest - least >= 2 * math.pi:
+            yaw = math.remainder(yaw, 2 * math.pi)
+        yaw = min(max(yaw, least), greatest)
+        x = min(max(round(x, 3), surface.low[0]), surface.high[0]) + 0.0
+        y = min(max(round(y, 3), surface.low[1]), surface.high[1]) + 0.0
+        return BasePose(number, x, y, round(yaw, 3) + 0.0) if surface.allows(x, y) else None
 
-    def in_world(self, name: str, robot: RobotDescriptor, seat: Seat) -> Pose:
-        """Return where the base of a robot in a seat is in the world."""
-        turn = faced(robot, yaw_quaternion(seat.yaw))
-        local = Pose((seat.x, seat.y, self.heights[name]), turn)
-        return self.sites[seat.site].pose.then(local)
+    def near(self, base: BasePose, dx: float, dy: float, dyaw: float = 0.0) -> BasePose | None:
+        """Return the base pose that is so far from another one (m, rad), if one may be there."""
+        return self.base(base.surface, base.x + dx, base.y + dy, base.yaw + dyaw)
+
+    def grid(self) -> list[BasePose]:
+        """Return base poses all over the surfaces, `MOST_BASES` at most, or few more."""
+        planes = [s for s in self.surfaces if s.low[0] < s.high[0]]
+        area = sum((s.high[0] - s.low[0]) * (s.high[1] - s.low[1]) for s in planes)
+        step = max(math.sqrt(area * TURNS / MOST_BASES), 0.05) if planes else 0.05
+        return [
+            base
+            for number, surface in enumerate(self.surfaces)
+            for x in _spaced(surface.low[0], surface.high[0], step)
+            for y in _spaced(surface.low[1], surface.high[1], step)
+            for yaw in _turns(surface)
+            if (base := self.base(number, x, y, yaw)) is not None
+        ]
+
+    def placement(
+        self, name: str, robot: RobotDescriptor, keyframe: str | None, base: BasePose
+    ) -> Placement:
+        """Return the placement of a robot at a base pose, as a layout declares it."""
+        position, on = (base.x, base.y, self.heights[name]), self.surfaces[base.surface].frame
+        if robot.home.quaternion == IDENTITY:  # written as a turn, which people read more easily
+            return Placement(robot, position, keyframe=keyframe, rpy=(0.0, 0.0, base.yaw), on=on)
+        return Placement(robot, position, faced(robot, yaw_quaternion(base.yaw)), keyframe, on=on)
+
+    def in_world(self, name: str, robot: RobotDescriptor, base: BasePose) -> Pose:
+        """Return where the base of a robot at a base pose is in the world."""
+        turn = faced(robot, yaw_quaternion(base.yaw))
+        local = Pose((base.x, base.y, self.heights[name]), turn)
+        return self.surfaces[base.surface].pose.then(local)
 
 
 def ground_of(
@@ -122,33 +143,28 @@ def ground_of(
         LayoutError: If an argument makes no sense, or leaves no place.
     """
     reach = max(robot.reach for robot in robots.values())
-    bounds = None if within is None else rectangle("within", within)
+    bounds = None if within is None else _rectangle("within", within)
     high = _heights(heights, robots)
     if around is None:
         return Ground((_on_the_ground(bounds, targets, reach, len(robots)),), {}, high)
     if isinstance(around, Frame):
         around = {"mount": around}
     if isinstance(around, Mapping):
-        sites = tuple(_on_frames(around, bounds, targets, reach))
-        return Ground(sites, dict(around), high)
+        surfaces = tuple(_on_frames(around, bounds, targets, reach))
+        return Ground(surfaces, dict(around), high)
     if not hasattr(around, "__len__") or isinstance(around, str) or len(around) != 4:
         raise _no_ground(around)
-    x_min, y_min, x_max, y_max = rectangle("around", around)
+    x_min, y_min, x_max, y_max = _rectangle("around", around)
     out = (x_min - EDGE, y_min - EDGE, x_max + EDGE, y_max + EDGE)
     low, top = (x_min - reach, y_min - reach), (x_max + reach, y_max + reach)
-    site = _clipped(Site(None, Pose(), low, top, free_of=out), bounds)
-    corners = [(x, y) for x in (site.low[0], site.high[0]) for y in (site.low[1], site.high[1])]
-    if not any(site.allows(*corner) for corner in corners):
+    surface = _clipped(BaseSurface(None, Pose(), low, top, keep_out=out), bounds)
+    corners = product(*zip(surface.low, surface.high, strict=True))
+    if not any(surface.allows(x, y) for x, y in corners):
         raise LayoutError(f"within {within} there is no room around {tuple(around)}")
-    return Ground((site,), {}, high)
+    return Ground((surface,), {}, high)
 
 
-def rectangle(what: str, value: object) -> Rectangle:
-    """Return x_min, y_min, x_max, y_max (m).
-
-    Raises:
-        LayoutError: If it is no rectangle.
-    """
+def _rectangle(what: str, value: object) -> Rectangle:
     x_min, y_min, x_max, y_max = checked_numbers(what, value, 4, FAR, LayoutError)
     if x_min >= x_max or y_min >= y_max:
         raise LayoutError(f"{what} is {shown(value)}; it must be x_min, y_min, x_max, y_max (m)")
@@ -164,7 +180,7 @@ def _no_ground(around: object) -> LayoutError:
 
 def _on_the_ground(
     within: Rectangle | None, targets: Sequence[Sequence[float]], reach: float, robots: int
-) -> Site:
+) -> BaseSurface:
     """Return the ground round the targets, or round the origin if there are none."""
     if targets:
         spread = np.array([target[:2] for target in targets])
@@ -172,15 +188,16 @@ def _on_the_ground(
     else:
         high = np.full(2, reach * math.sqrt(robots))
         low = -high
-    site = Site(None, Pose(), (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
-    return _clipped(site, within)
+    return _clipped(_surface(None, Pose(), low, high), within)
 
 
-def _clipped(site: Site, within: Rectangle | None) -> Site:
-    if within is None:
-        return site
-    low, high = (within[0], within[1]), (within[2], within[3])
-    return Site(site.frame, site.pose, low, high, site.turns, site.free_of)
+def _surface(frame: str | None, pose: Pose, low: Floats, high: Floats) -> BaseSurface:
+    (x_min, y_min), (x_max, y_max) = low.tolist(), high.tolist()
+    return BaseSurface(frame, pose, (x_min, y_min), (x_max, y_max))
+
+
+def _clipped(surface: BaseSurface, within: Rectangle | None) -> BaseSurface:
+    return surface if within is None else replace(surface, low=within[:2], high=within[2:])
 
 
 def _on_frames(
@@ -188,29 +205,29 @@ def _on_frames(
     within: Rectangle | None,
     targets: Sequence[Sequence[float]],
     reach: float,
-) -> list[Site]:
+) -> list[BaseSurface]:
     """Return the edges of tables, and the planes of all other frames."""
     if not frames or not all(isinstance(frame, Frame) for frame in frames.values()):
         raise _no_ground(frames)
     poses = resolve({name: (frame.on, frame.local_pose) for name, frame in frames.items()})
     tables = table_outlines(poses)
     edges = {f"{table}.{edge}" for table in tables for edge in EDGES}
-    sites = [_edge(name, poses, tables) for name in frames if name in edges]
+    surfaces = [_edge(name, poses, tables) for name in frames if name in edges]
     planes = [name for name in frames if name not in edges and name not in tables]
     if within is not None and not planes:
         raise LayoutError(
             f"within is {within}, but bases stand along the edges of {', '.join(tables)}; make the"
             " table smaller, or leave within out"
         )
-    return sites + [_plane(name, poses[name], within, targets, reach) for name in planes]
+    return surfaces + [_plane(name, poses[name], within, targets, reach) for name in planes]
 
 
-def _edge(name: str, poses: Mapping[str, Pose], tables: Mapping[str, list[Vector3]]) -> Site:
+def _edge(name: str, poses: Mapping[str, Pose], tables: Mapping[str, list[Vector3]]) -> BaseSurface:
     corners = np.array(tables[name.rpartition(".")[0]])
     middle = np.array(poses[name].position)
     half = float(np.sort(np.linalg.norm(corners - middle, axis=1))[0])
     room = max(half - EDGE, 0.0)
-    return Site(name, poses[name], (EDGE, -room), (EDGE, room), (-SIDEWAYS, SIDEWAYS))
+    return BaseSurface(name, poses[name], (EDGE, -room), (EDGE, room), (-SIDEWAYS, SIDEWAYS))
 
 
 def _plane(
@@ -219,14 +236,13 @@ def _plane(
     within: Rectangle | None,
     targets: Sequence[Sequence[float]],
     reach: float,
-) -> Site:
+) -> BaseSurface:
     places = np.array([target[:3] for target in targets] or [pose.position])
     back = np.linalg.inv(pose_matrix(pose.position, pose.quaternion))
     local = places @ back[:2, :3].T + back[:2, 3]
     low, high = local.min(axis=0) - reach, local.max(axis=0) + reach
     low, high = np.minimum(low, -reach), np.maximum(high, reach)
-    plane = Site(name, pose, (float(low[0]), float(low[1])), (float(high[0]), float(high[1])))
-    return _clipped(plane, within)
+    return _clipped(_surface(name, pose, low, high), within)
 
 
 def _heights(
@@ -240,3 +256,15 @@ def _heights(
         name: checked_number("heights", given.get(name, 0.0), -FAR, FAR, LayoutError, "m")
         for name in robots
     }
+
+
+def _spaced(low: float, high: float, step: float) -> list[float]:
+    count = math.ceil((high - low) / step - 1e-9) + 1 if high > low else 1
+    return np.linspace(low, high, count).tolist()
+
+
+def _turns(surface: BaseSurface) -> list[float]:
+    low, high = surface.turns
+    whole = high - low >= 2 * math.pi
+    count = TURNS if whole else round(TURNS * (high - low) / (2 * math.pi)) + 1
+    return np.linspace(low, high, count, endpoint=not whole).tolist()

@@ -1,0 +1,102 @@
+"""What an export leaves behind: names of files, folders, and a note on licences."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+
+from robot_layouts.core.writing import PARTIAL, remove, written_whole
+from robots import LayoutError, RobotDescriptor, UrdfLocator
+from robots.assets.assembled import AssembledUrdf
+from robots.assets.manifest import load_manifest
+from robots.descriptor import UrdfSource
+
+LICENCES = "LICENCES.md"  # a note on those of robot files
+
+
+class Names:
+    """Gives out names, none of them twice, whatever the case of their letters."""
+
+    def __init__(self, forbidden: str = r"[^\w.-]") -> None:
+        """Give out names.
+
+        Args:
+            forbidden: Pattern of a character that no name may have; ``_`` takes its place.
+        """
+        self._forbidden = re.compile(forbidden, re.ASCII)
+        self._taken: set[str] = set()
+
+    def new(self, wanted: str) -> str:
+        """Return a name that is free: the one wanted, or it with a number behind it."""
+        plain = self._forbidden.sub("_", wanted)
+        numbered = (plain if i == 1 else f"{plain}_{i}" for i in count(1))
+        name = next(name for name in numbered if name.lower() not in self._taken)
+        self._taken.add(name.lower())
+        return name
+
+
+@contextmanager
+def replaced_folder(folder: Path, is_own: Callable[[Path], bool], advice: str) -> Generator[Path]:
+    """Give a folder to fill; at the end it takes the place of what an earlier export left.
+
+    Args:
+        folder: The folder to be.
+        is_own: Tells of what lies in a folder of that name whether an export leaves such.
+        advice: What to do if there is something else, for the message.
+
+    Raises:
+        LayoutError: If the folder holds something else, which would be lost.
+        UnwritableFileError: If it cannot be written.
+    """
+    there = sorted(folder.iterdir()) if folder.is_dir() else []
+    strange = [found.name for found in there if not is_own(found)]
+    if strange:
+        raise LayoutError(
+            f"{folder} would be replaced, but holds {', '.join(strange)}, which no export of a"
+            f" layout leaves; move it, or {advice}"
+        )
+    with written_whole(folder) as made:
+        made.mkdir(parents=True)
+        yield made
+        old = made.with_name(f"{made.name.removesuffix(PARTIAL)}.old{PARTIAL}")
+        if folder.is_dir():
+            os.replace(folder, old)
+    remove(old)
+
+
+def licence_note(robots: Iterable[RobotDescriptor]) -> str:
+    """Return a page that says under what licence the files of some robots are.
+
+    Args:
+        robots: The robots, of which each is listed once.
+    """
+    lines = dict.fromkeys(
+        f"- {robot.name}: {words}" for robot in robots for _, words in _licences(robot.urdf)
+    )
+    head = (
+        "# Robot files\n\nThe meshes and numbers of robots are made of files that others wrote."
+        " They are not this package's, and stay under their licences:\n"
+    )
+    return "\n".join([head, *lines, ""])
+
+
+def short_licences(robots: Iterable[RobotDescriptor]) -> tuple[str, ...]:
+    """Return the short names of the licences of some robots' files, each once."""
+    return tuple(dict.fromkeys(name for robot in robots for name, _ in _licences(robot.urdf)))
+
+
+def _licences(source: UrdfSource) -> Iterator[tuple[str, str]]:
+    """Yield the licence of each part of a robot: its short name, and what to know about it."""
+    if isinstance(source, AssembledUrdf):
+        for part in (source.body, *(part.urdf for part in source.parts)):
+            yield from _licences(part)
+    elif isinstance(source, UrdfLocator):
+        origin = load_manifest().package(source.package).origin
+        yield origin.licence, f"{origin.licence} ({origin.licence_note})"
+    else:
+        words = "of a file of the user's own; whoever wrote it says under what licence it is"
+        yield "unknown", words
