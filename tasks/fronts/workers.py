@@ -8,6 +8,17 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from robot_layouts.core.processes.start import WorkerError as ProcessWorkerError
+from robot_layouts.core.processes.start import enough, preload
+from robot_layouts.core.processes.transport import RemoteError, WorkerTraceback, packed
+from robot_layouts.core.processes.worker import (
+    MAKE,
+    Pool,
+    Reply,
+    Status,
+    Worker,
+    receive_descriptor,
+)
 from tasks.fronts.batch import (
     Arrays,
     Batch,
@@ -18,10 +29,8 @@ from tasks.fronts.batch import (
     memory_size,
     new_shared_memory,
 )
-from tasks.processes.start import WorkerError as ProcessWorkerError
-from tasks.processes.start import enough
-from tasks.processes.transport import RemoteError, WorkerTraceback, packed
-from tasks.processes.worker import MAKE, Pool, Reply, Status, Worker, receive_descriptor
+
+preload(__name__, "robot_layouts.simulation")
 
 START_SECONDS = 300.0  # until all workers have built their worlds
 

@@ -20,14 +20,14 @@ import pytest
 
 import tasks
 from benchmarks.soak import read_level
+from robot_layouts.core.processes.start import ProcessError
+from robot_layouts.core.processes.transport import RemoteError, SentError, packed
+from robot_layouts.core.processes.worker import Status, Worker
 from robot_layouts.simulation.rendering.pictures import vulkan_problem
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import RobotLayoutsError, SimulationError, TaskError
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
-from tasks.processes.start import ProcessError
-from tasks.processes.transport import RemoteError, SentError, packed
-from tasks.processes.worker import Status, Worker
 from tests.fresh_process import in_fresh_process
 from tests.tasks import breaking
 

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from layouts import face_to_face
+from robot_layouts.core.processes.worker import Worker
 from robots import SimulationError, TaskError
 from tasks.fronts.vector import VectorTask
 from tasks.fronts.workers import WorkerError
-from tasks.processes.worker import Worker
 from tests.tasks import breaking
 
 GONE, LEFT = [0, 1], [2, 3]  # environments of the first worker and of the second

@@ -12,11 +12,11 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+from robot_layouts.core.errors import RobotLayoutsError
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.rooms import PACKAGES
-from robots import RobotLayoutsError
-from tasks.processes.start import WorkerError
 
-_CHECKOUT = Path(__file__).parents[2]
+_CHECKOUT = Path(__file__).parents[3]
 _ALONE = "use this process alone: workers=0, and num_workers=0 of a vector"
 _HINT = f"define it in a module that they can import, or {_ALONE}"
 

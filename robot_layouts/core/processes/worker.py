@@ -15,8 +15,8 @@ from enum import Enum, auto
 from multiprocessing.connection import wait
 from typing import Any
 
-from tasks.processes.start import WorkerError, enough, exit_code, start
-from tasks.processes.transport import SentError, described, loaded
+from robot_layouts.core.processes.start import WorkerError, enough, exit_code, start
+from robot_layouts.core.processes.transport import SentError, described, loaded
 
 SHUTDOWN_SECONDS = 2.0  # that a worker may take to end by itself
 MAKE = 0  # the request that a worker begins with

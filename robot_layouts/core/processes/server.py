@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from importlib import import_module
 
-from tasks.processes.start import SERVER_OF, end_with_parent
-
-LOADED = ("tasks.fronts.workers", "robot_layouts.simulation")
+from robot_layouts.core.processes.start import PRELOAD, SERVER_OF, end_with_parent
 
 if os.environ.get(SERVER_OF) == str(os.getppid()):
     end_with_parent()
-    for module in LOADED:
+    # Python before 3.11 knows no safe path, and looks for modules in the present folder first
+    sys.path[:] = os.environ["PYTHONPATH"].split(os.pathsep)
+    for module in os.environ[PRELOAD].split():
         import_module(module)
     gc.collect()
     gc.freeze()  # no worker's collector writes to memory that all of them share

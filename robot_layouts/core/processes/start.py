@@ -1,7 +1,7 @@
-"""How worker processes start: as forks of a server that has loaded torch and SAPIEN.
+"""How worker processes start: as forks of a server that has loaded what they need.
 
-A process that is spawned loads both for itself, which takes seconds. The server is that of
-`multiprocessing`; this module adds that workers end with this process whatever ends it, and that
+A process that is spawned loads torch and SAPIEN for itself, which takes seconds. The server is that
+of `multiprocessing`; this module adds that workers end with this process whatever ends it, and that
 they have its environment variables and cores as they are when a worker starts.
 """
 
@@ -26,11 +26,10 @@ from threading import RLock, Thread
 from typing import Any, TypeAlias
 from weakref import WeakSet
 
-import numpy as np
-
-from robots import RobotLayoutsError
+from robot_layouts.core.errors import RobotLayoutsError
 
 SERVER_OF = "ROBOT_LAYOUTS_SERVER_OF"  # variable of the server: the process that it serves
+PRELOAD = "ROBOT_LAYOUTS_PRELOAD"  # likewise: the modules that it loads
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
 _DESCRIPTORS = 12  # that starting a process takes for a moment, and the server as well
@@ -44,6 +43,7 @@ _WHAT_RAN_OUT = {
 }
 
 _Call: TypeAlias = "tuple[Callable[[], BaseProcess], Future[BaseProcess]]"
+_preloaded: dict[str, None] = {}  # modules, in order
 _started: WeakSet[BaseProcess] = WeakSet()
 _server_is_inherited = False
 _lock = RLock()  # two threads that read an exit code at the same time get a wrong one
@@ -55,6 +55,11 @@ class WorkerError(RobotLayoutsError, RuntimeError):
 
 class ProcessError(WorkerError):
     """Worker processes that cannot be started."""
+
+
+def preload(*modules: str) -> None:
+    """Let the server load modules before it forks a worker; for those that workers will import."""
+    _preloaded.update(dict.fromkeys(modules))
 
 
 def start(work: Callable[..., None], *arguments: Any) -> BaseProcess:
@@ -127,7 +132,7 @@ def _start(work: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProcess
         reload(forkserver)
         _server_is_inherited = False
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["tasks.processes.server"])
+    context.set_forkserver_preload(["robot_layouts.core.processes.server"])
     with _server_environment():
         forkserver.ensure_running()
     process = context.Process(
@@ -173,7 +178,8 @@ def _begin(
     os.environ.clear()
     os.environ.update(environment)
     os.sched_setaffinity(0, cores)
-    np.random.seed()  # forks would all draw the same numbers
+    if numpy := sys.modules.get("numpy"):
+        numpy.random.seed()  # forks would all draw the same numbers
     work(*arguments)
 
 
@@ -185,6 +191,7 @@ def _server_environment() -> Generator[None]:
         "PYTHONPATH": os.pathsep.join(sys.path),  # Python before 3.13 forgets it
         "PYTHONSAFEPATH": "1",  # else the present folder's files hide those of this library
         SERVER_OF: str(os.getpid()),
+        PRELOAD: " ".join(_preloaded),
     }
     before = {name: os.environ.get(name) for name in changed}
     os.environ.update(changed)
