@@ -1,7 +1,8 @@
-"""Arrays out of what users give for them."""
+"""Arrays out of what users give for them, and mappings of arrays, which may be nested."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -26,3 +27,19 @@ def array_of(value: Any, what: str, error: type[RobotLayoutsError]) -> NDArray[A
         return np.asarray(value)
     except (TypeError, ValueError, RuntimeError) as problem:  # sparse, quantized, meta, ragged
         raise error(f"{what} is not an array of numbers: {problem}") from None
+
+
+def leaves(tree: Any, *path: str) -> Iterator[tuple[str, Any]]:
+    """Yield what a nested mapping holds, by the path to it: ``"extra/tcp_pose"``."""
+    if isinstance(tree, Mapping):
+        for key, part in tree.items():
+            yield from leaves(part, *path, key)
+    else:
+        yield "/".join(path), tree
+
+
+def row_of(tree: Any, row: int) -> Any:
+    """Return one row of each array of a nested mapping, or of a single array."""
+    if isinstance(tree, Mapping):
+        return {key: row_of(part, row) for key, part in tree.items()}
+    return tree[row]

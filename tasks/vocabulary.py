@@ -54,12 +54,11 @@ from tasks.language.props import (
 from tasks.language.randomness import EpisodeRandom
 from tasks.language.shaping import closeness, letting_go, stillness
 from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
+from tasks.randomization.declaration import Randomization, Shift
+from tasks.randomization.distractors import Distractors
+from tasks.randomization.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
+from tasks.randomization.looks import CameraShift, Light, Surface, Texture
 from tasks.registry import register_task
-from tasks.varying.axes import Shift
-from tasks.varying.distractors import Distractors
-from tasks.varying.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
-from tasks.varying.looks import CameraShift, Light, Surface, Texture
-from tasks.varying.randomization import Randomization
 
 __all__ = [
     "Area",

@@ -22,7 +22,7 @@ from robot_layouts.simulation import Camera, PhysicsSettings
 from robots import TaskError
 from tasks.engine.task import DENSE_MODES, Task
 from tasks.language.bodies import Body, Table, WideTable
-from tasks.varying.randomization import Randomization
+from tasks.randomization.declaration import Randomization
 
 HOOKS = {
     "design": ("rng",),

@@ -8,7 +8,7 @@ from typing import TypedDict
 from layouts import Layout
 from layouts.placement import RobotLike
 from robot_layouts.simulation import Camera, PhysicsSettings
-from tasks.varying.randomization import Randomization
+from tasks.randomization.declaration import Randomization
 
 
 class ScenarioFields(TypedDict, total=False):

@@ -29,7 +29,7 @@ from tasks.engine.columns import (
 from tasks.engine.finite import NotFinite
 from tasks.native import controllers
 from tasks.native.format import observation_keys
-from tasks.varying.noise import Noisy
+from tasks.randomization.noise import Noisy
 
 if TYPE_CHECKING:
     from robot_layouts.simulation.rendering.pictures import Observers, View

@@ -19,7 +19,7 @@ from tasks.engine.bystanders import BYSTANDERS
 from tasks.engine.cameras import checked_size
 from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
-from tasks.varying.randomization import Randomization
+from tasks.randomization.declaration import Randomization
 
 RENDER_MODES = (None, "rgb_array")
 LEAST_BYTES = 400_000  # of an environment: that of PickCube-v1, one of the smallest, takes 435 kB

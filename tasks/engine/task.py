@@ -16,10 +16,10 @@ from tasks.engine.scenario import Scenario
 from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
 from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
-from tasks.varying.distributions import Distribution, Normal
-from tasks.varying.noise import noise
-from tasks.varying.randomization import Randomization
-from tasks.varying.varying import Varying
+from tasks.randomization.declaration import Randomization
+from tasks.randomization.distributions import Distribution, Normal
+from tasks.randomization.noise import noise
+from tasks.randomization.randomizer import Randomizer
 
 Info = dict[str, Any]
 
@@ -80,7 +80,7 @@ class Task:
     simulation: Simulation
     moving: Sequence[int]
     memory: Memory
-    _varying: Varying | None
+    _randomizer: Randomizer | None
     _rngs: Sequence[EpisodeRandom]
     _elapsed: NDArray[np.int32]
 
@@ -193,20 +193,20 @@ class Task:
         Returns:
             Such as ``{"mass": {"cube": 1.31}}``; see `tasks.Randomization`. None if nothing varies.
         """
-        return None if self._varying is None else self._varying.drawn(env)
+        return None if self._randomizer is None else self._randomizer.drawn(env)
 
     def standing(self, env: int = 0) -> Layout:
         """Return the layout as robots stand in the present episode of an environment.
 
         It is ``layout``, unless the bases of robots vary. What is planned is planned in this one.
         """
-        return self.layout if self._varying is None else self._varying.layout(env)
+        return self.layout if self._randomizer is None else self._randomizer.layout(env)
 
     def scale(self, body: str) -> Floats:
         """Return the factor by which a body is larger than declared, (N,); 1 if sizes are fixed."""
-        if self._varying is None:
+        if self._randomizer is None:
             return np.ones(self.num_envs, np.float32)
-        return self._varying.scale(body)
+        return self._randomizer.scale(body)
 
     def noise(self, name: str, width: int, drawn: Distribution = _NORMAL) -> Floats:
         """Return noise for `observe`, a function of each episode's seed and step alone.

@@ -45,8 +45,8 @@ from robot_layouts.experts import find_expert
 from robots import RecordingError, TaskError
 from tasks import MultiRobotTask, Scenario
 from tasks.episode import PlayedEpisode, Policy, Score
+from tasks.randomization.declaration import Randomization
 from tasks.registry import make_scenario
-from tasks.varying.randomization import Randomization
 
 FILE = "trajectory.h5"
 _TYPES = {kinds.EXPERT: "scripted", kinds.POLICY: "policy", kinds.PERSON: "human"}

@@ -1,9 +1,9 @@
-"""Draws what varies in a task's worlds, and lets them differ by it."""
+"""Draws what a randomization varies in a task's worlds, and lets them differ by it."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,21 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
+from robot_layouts.kinematics.quaternions import multiplied, yaw_quaternion
 from robot_layouts.simulation import Camera, Simulation, State, World
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.scene.variation import Variation
 from robots.descriptor import Vector3
-from tasks.varying import targets as find
-from tasks.varying.axes import AXES
-from tasks.varying.bases import shifted
-from tasks.varying.delays import ActionDelay, ObservationDelay
-from tasks.varying.distractors import Rectangle
-from tasks.varying.groups import Group
-from tasks.varying.looks import look_targets, looks
-from tasks.varying.noise import ActionNoise, Noisy, SensorNoise
-from tasks.varying.randomization import Randomization
-from tasks.varying.scattering import Scattering
-from tasks.varying.streams import Stream
+from tasks.arrays import leaves
+from tasks.randomization import targets as find
+from tasks.randomization.declaration import AXES, Randomization
+from tasks.randomization.distractors import Rectangle, Scattering
+from tasks.randomization.distributions import Stream
+from tasks.randomization.groups import Group
+from tasks.randomization.looks import look_targets, looks
+from tasks.randomization.noise import ActionDelay, ActionNoise, Noisy, ObservationDelay, SensorNoise
 
 DRAWN = "drawn"  # what the names of what was drawn begin with in ``info``
 
@@ -42,7 +40,7 @@ _OFFERED = {  # what there is to vary, by name
 _AT_EVERY_STEP = ("action_noise", "sensor_noise")
 
 
-class Varying:
+class Randomizer:
     """What varies in N worlds, and what was last drawn for each of them.
 
     Attributes:
@@ -97,7 +95,7 @@ class Varying:
         self._streams[env] = stream
         drawn = self._drawn[env] = self._draw(stream)
         if "bases" in drawn:
-            self._standing[env] = shifted(self._layout, drawn["bases"])
+            self._standing[env] = _shifted(self._layout, drawn["bases"])
         if self._sending is not None:
             self._sending.begin(env, drawn["action_delay"])
         if self._seeing is not None:
@@ -109,7 +107,7 @@ class Varying:
 
     def info(self) -> dict[str, NDArray[np.float32]]:
         """Return what was drawn for all environments, (N,) each: ``drawn/mass/cube``."""
-        rows = [dict(_leaves(DRAWN, drawn)) for drawn in self._drawn]
+        rows = [dict(leaves(drawn, DRAWN)) for drawn in self._drawn]
         return {name: np.array([row[name] for row in rows], np.float32) for name in rows[0]}
 
     def layout(self, env: int) -> Layout:
@@ -237,8 +235,9 @@ class Varying:
 def _value(takes: Any, stream: Stream, *names: str) -> Any:
     """Return what is drawn for a name: a number, or those of a group by field."""
     if isinstance(takes, Group):
-        numbers = takes.drawn.items()
-        return {name: _value(drawn, stream, *names, name) for name, drawn in numbers}
+        takes = takes.drawn
+    if isinstance(takes, Mapping):
+        return {name: _value(drawn, stream, *names, name) for name, drawn in takes.items()}
     return takes.value(stream.number(*names))
 
 
@@ -250,9 +249,19 @@ def _of_strength(gravity: Vector3, strength: float) -> Vector3:
     return x * share, y * share, z * share
 
 
-def _leaves(name: str, tree: Any) -> Iterator[tuple[str, float]]:
-    if isinstance(tree, Mapping):
-        for key, part in tree.items():
-            yield from _leaves(f"{name}/{key}", part)
-    else:
-        yield name, tree
+def _shifted(layout: Layout, shifts: Mapping[str, Mapping[str, float]]) -> Layout:
+    """Return a layout whose robots stand off their placements; what hangs on them follows.
+
+    Args:
+        layout: As it was declared.
+        shifts: By robot: ``x``, ``y``, ``z`` (m) and ``yaw`` (rad), as far as they vary.
+    """
+    placements = dict(layout)
+    for name, shift in shifts.items():
+        pose = layout[name].local_pose
+        x, y, z = (a + shift.get(axis, 0.0) for a, axis in zip(pose.position, "xyz", strict=True))
+        turned = pose.quaternion
+        if yaw := shift.get("yaw", 0.0):
+            turned = multiplied(yaw_quaternion(yaw), turned)
+        placements[name] = replace(layout[name], position=(x, y, z), quaternion=turned, rpy=None)
+    return Layout(placements, layout.frames)

@@ -1,20 +1,111 @@
-"""The declaration of what varies from episode to episode."""
+"""The declaration of what varies from episode to episode: its axes, and the files that hold it."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from math import inf, pi
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
+
+import yaml
 
 from robot_layouts.core.bounds import shown
-from robots import RobotLayoutsError, TaskError, UnknownNameError
-from tasks.varying.axes import AXES, Shift
-from tasks.varying.distractors import Distractors
-from tasks.varying.distributions import Distribution
-from tasks.varying.files import read_data, write_data
-from tasks.varying.looks import CameraShift, Light, Surface, Texture
+from robot_layouts.core.files import read_text
+from robot_layouts.core.writing import write_whole
+from robot_layouts.core.yaml_text import WordLoader, compose
+from robots import RobotLayoutsError, TaskError, UnknownNameError, UnreadableFileError
+from tasks.randomization.distractors import Distractors
+from tasks.randomization.distributions import Distribution
+from tasks.randomization.groups import Group, Limits
+from tasks.randomization.looks import CameraShift, Light, Surface, Texture
+
+MAX_LENGTH = 1 << 18  # bytes of a file
+MAX_DEPTH = 16  # of mappings and lists inside one another
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One way in which worlds vary.
+
+    Attributes:
+        takes: What is drawn: a number within limits, or a group of numbers.
+        named: Whether it is declared for each of several things, by name.
+        rebuilds: Whether a world must be built anew to change it.
+    """
+
+    takes: Limits | type[Group]
+    named: bool = True
+    rebuilds: bool = False
+
+    def read(self, data: Any, what: str) -> Any:
+        """Return what was declared for an axis, checked: one thing, or by name.
+
+        Raises:
+            TaskError: If it makes no sense.
+        """
+        if not self.named:
+            return None if data is None else self.takes.read(data, what)
+        if not isinstance(data, Mapping):
+            raise TaskError(
+                f"{what} is {shown(data)}; it takes what is drawn by name, such as"
+                f" {what}={{'cube': Uniform(0.5, 2)}}"
+            )
+        for name in data:
+            if not isinstance(name, str) or not name:
+                raise TaskError(f"{what} has the name {shown(name)}; names are texts")
+        return {name: self.takes.read(given, f"{what} of {name!r}") for name, given in data.items()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shift(Group):
+    """How a robot's base is off its placement, in the world or in what it hangs on.
+
+    Attributes:
+        x: Along x (m).
+        y: Along y (m).
+        z: Along z (m).
+        yaw: Turn about z, at its own place (rad).
+    """
+
+    x: Distribution | None = None
+    y: Distribution | None = None
+    z: Distribution | None = None
+    yaw: Distribution | None = None
+
+    limits: ClassVar[Mapping[str, Limits]] = {
+        **dict.fromkeys(("x", "y", "z"), Limits(-100.0, 100.0, "m")),
+        "yaw": Limits(-2 * pi, 2 * pi, "rad"),
+    }
+
+
+_FACTOR = Limits(1e-3, 1e3, "factor on what is declared")
+_COEFFICIENT = Limits(0.0, 1e3, "coefficient of friction")
+_STEPS = Limits(0, 1000, "control steps", whole=True)
+_NOISE = Limits(-inf, inf, "added to the number")
+
+AXES = {
+    "mass": Axis(_FACTOR),
+    "friction": Axis(_COEFFICIENT),
+    "size": Axis(Limits(0.01, 100.0, "factor on what is declared"), rebuilds=True),
+    "stiffness": Axis(_FACTOR),
+    "damping": Axis(_FACTOR),
+    "joint_friction": Axis(_COEFFICIENT),
+    "gravity": Axis(Limits(0.0, 1000.0, "m/s²"), named=False, rebuilds=True),
+    "bases": Axis(Shift),
+    "cameras": Axis(CameraShift),
+    "lights": Axis(Light),
+    "colors": Axis(Surface),
+    "textures": Axis(Texture),
+    "distractors": Axis(Distractors, named=False),
+    "action_noise": Axis(_NOISE),
+    "action_delay": Axis(_STEPS, named=False),
+    "sensor_noise": Axis(_NOISE),
+    "observation_delay": Axis(_STEPS, named=False),
+}
+"""Every axis by its field in `tasks.Randomization`, in the order in which they are shown."""
 
 
 def _by_name() -> Any:
@@ -146,7 +237,13 @@ class Randomization:
         Raises:
             UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
-        write_data(path, self.to_json())
+        if Path(path).suffix.lower() == ".json":
+            text = json.dumps(self.to_json(), indent=2) + "\n"
+        else:
+            text = yaml.safe_dump(
+                self.to_json(), sort_keys=False, default_flow_style=None, allow_unicode=True
+            )
+        write_whole(path, text)
         return Path(path)
 
     def __str__(self) -> str:
@@ -159,3 +256,67 @@ class Randomization:
 
 
 assert {field.name for field in fields(Randomization)} == AXES.keys()
+
+
+# -- files: YAML or json, read as plain data; nothing in a file is executed ------------------------
+
+
+def read_data(path: str | PathLike[str], what: str = "randomization") -> Any:
+    """Return what a file holds: mappings, lists, numbers and texts. Json is YAML, too.
+
+    Args:
+        path: The file.
+        what: What it declares, for errors.
+
+    Raises:
+        TaskError: If it cannot be read or is no YAML; names the file, and the line if it can.
+    """
+    try:
+        text = read_text(path, MAX_LENGTH)
+    except UnreadableFileError as error:
+        raise TaskError(f"cannot read the {what} {str(path)!r}: {error.strerror}") from error
+    try:
+        node = compose(text)
+    except ValueError as error:
+        raise TaskError(f"{path}, {error}") from error
+    _check(text, path)
+    return {} if node is None else _plain(node, str(path))
+
+
+def _check(text: str, path: str | PathLike[str]) -> None:
+    """Refuse what plain data does not need."""
+    depth = 0
+    for event in yaml.parse(text, WordLoader):
+        where = f"{path}, line {event.start_mark.line + 1}"
+        if isinstance(event, yaml.AliasEvent):
+            raise TaskError(f"{where}: aliases (*{event.anchor}) are not read")
+        if tag := getattr(event, "tag", None):
+            raise TaskError(f"{where}: tags ({shown(tag)}) are not read")
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_DEPTH:
+            raise TaskError(f"{where}: it nests deeper than {MAX_DEPTH} levels")
+
+
+def _plain(node: yaml.Node, path: str) -> Any:
+    if isinstance(node, yaml.SequenceNode):
+        return [_plain(inner, path) for inner in node.value]
+    if not isinstance(node, yaml.MappingNode):
+        quoted = node.style in ("'", '"')  # pyright: ignore[reportAttributeAccessIssue]
+        return node.value if quoted else _number(node.value)
+    found: dict[str, Any] = {}
+    for key, value in node.value:
+        name, line = key.value, key.start_mark.line + 1
+        if not isinstance(name, str):
+            raise TaskError(f"{path}, line {line}: a name must be a text")
+        if name in found:
+            raise TaskError(f"{path}, line {line}: {name!r} is there twice")
+        found[name] = _plain(value, path)
+    return found
+
+
+def _number(word: str) -> Any:
+    try:
+        return float(word)
+    except ValueError:
+        return word

@@ -1,22 +1,52 @@
-"""Distributions that a randomization draws from, each a function of one number in [0, 1).
+"""Distributions that a randomization draws from, and the random numbers that they turn into values.
 
-One uniform number makes one value, so how many numbers anything takes never depends on what was
-drawn. The arithmetic is Python's own, and the same with every version of NumPy.
+One uniform number in (0, 1) makes one value, so how many numbers anything takes never depends on
+what was drawn. The arithmetic is Python's own, and the same with every version of NumPy.
 """
 
 from __future__ import annotations
 
 import math
+import struct
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from hashlib import shake_128
 from statistics import NormalDist
-from typing import Any
+from typing import Any, NamedTuple
 
 from robot_layouts.core.bounds import FAR, as_float, checked_number, checked_whole, shown
 from robots import TaskError, UnknownNameError
 
 _STANDARD = NormalDist()
+_BITS = 53  # of a double
+
+
+class Stream(NamedTuple):
+    """Where an episode's random numbers come from: each is a function of what it is for.
+
+    There is no state. A number follows from the episode's seed, from how many resets without a seed
+    came since, and from the name of what it is drawn for: so another axis or another body never
+    changes what the others draw, and the task's own streams stay what they are. The words are those
+    of SHAKE-128, which are the same everywhere.
+
+    Attributes:
+        seed: Seed of the episode.
+        resets: How many resets without a seed came since the one that had it.
+    """
+
+    seed: int
+    resets: int = 0
+
+    def number(self, *names: str | int) -> float:
+        """Return the number in (0, 1) that belongs to a name, such as ``"mass", "cube"``."""
+        return self.numbers(1, *names)[0]
+
+    def numbers(self, count: int, *names: str | int) -> list[float]:
+        """Return several; the first ones are the same however many are asked for."""
+        about = "\0".join(map(str, (self.seed, self.resets, *names)))
+        words = struct.unpack(f"<{count}Q", shake_128(about.encode()).digest(8 * count))
+        return [((word >> (64 - _BITS)) + 0.5) * 2.0**-_BITS for word in words]
 
 
 class Distribution(ABC):

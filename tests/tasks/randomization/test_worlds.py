@@ -11,7 +11,7 @@ import torch
 import tasks
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from tasks import LogUniform, Randomization, TaskEnv, Uniform
-from tests.tasks.varying.declarations import IN_PLACE, TASK, VARIED
+from tests.tasks.randomization.declarations import IN_PLACE, TASK, VARIED
 
 REBUILT = {"reconfigure": True}
 

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from robots import TaskError, UnknownNameError
 from tasks import Choice, Fixed, LogUniform, Normal, Uniform, Whole
-from tasks.varying.distributions import Distribution, read_distribution
-from tasks.varying.streams import Stream
+from tasks.randomization.distributions import Distribution, Stream, read_distribution
 
 ALL = (
     Fixed(2.0),

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
 from typing import Any, ClassVar
 
 from layouts import Layout
-from robot_layouts.core.bounds import shown
 from robot_layouts.simulation import Camera, Simulation
 from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, camera_name
 from robot_layouts.simulation.scene.looks import (
@@ -21,19 +19,23 @@ from robot_layouts.simulation.scene.looks import (
     Shift,
 )
 from robot_layouts.simulation.scene.parts import Part
-from robots import TaskError, UnknownNameError
-from tasks.varying.distributions import Choice, Distribution, LogUniform, Whole
-from tasks.varying.groups import Declared, Group, Limits
-from tasks.varying.targets import linked_parts
+from robots.descriptor import Vector3
+from tasks.randomization.distributions import Choice, Distribution, Whole
+from tasks.randomization.groups import (
+    ANGLE,
+    COLORS,
+    FRACTION,
+    METRES,
+    TONES,
+    Declared,
+    Group,
+    Limits,
+    some_of,
+)
+from tasks.randomization.targets import linked_parts
 
-_METRES = Limits(-inf, inf, "m")
-_ANGLE = Limits(-inf, inf, "rad")
-_FRACTION = Limits(0.0, 1.0, "a fraction")
 _STRENGTH = Limits(0.0, 100.0, "factor on what is declared")
 _SEEDS = 10**6
-
-TONES = LogUniform(0.02, 1.0)
-"""Of light: dark, middle and bright tones about as often, as eyes see them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,8 +61,8 @@ class CameraShift(Group):
     fov: Declared = None
 
     limits: ClassVar[Mapping[str, Limits]] = {
-        **dict.fromkeys(("x", "y", "z"), _METRES),
-        **dict.fromkeys(("roll", "pitch", "yaw"), _ANGLE),
+        **dict.fromkeys(("x", "y", "z"), METRES),
+        **dict.fromkeys(("roll", "pitch", "yaw"), ANGLE),
         "fov": Limits(0.01, 10.0, "factor on what is declared"),
     }
 
@@ -86,8 +88,8 @@ class Light(Group):
     blue: Declared = None
 
     limits: ClassVar[Mapping[str, Limits]] = {
-        **dict.fromkeys(("turn", "tilt"), _ANGLE),
-        **dict.fromkeys(("strength", "red", "green", "blue"), _STRENGTH),
+        **dict.fromkeys(("turn", "tilt"), ANGLE),
+        **dict.fromkeys(("strength", *COLORS), _STRENGTH),
     }
 
 
@@ -115,7 +117,7 @@ class Surface(Group):
     specular: Declared = None
 
     limits: ClassVar[Mapping[str, Limits]] = dict.fromkeys(
-        ("red", "green", "blue", "share", "roughness", "metallic", "specular"), _FRACTION
+        (*COLORS, "share", "roughness", "metallic", "specular"), FRACTION
     )
 
 
@@ -139,7 +141,7 @@ class Texture(Group):
 
     limits: ClassVar[Mapping[str, Limits]] = {
         "cells": Limits(1, 64, "repeats", whole=True),
-        **dict.fromkeys(("red", "green", "blue"), _FRACTION),
+        **dict.fromkeys(COLORS, FRACTION),
     }
 
     def __post_init__(self) -> None:
@@ -151,20 +153,13 @@ class Texture(Group):
             UnknownNameError: If there is no such pattern.
         """
         super().__post_init__()
-        kinds = (self.kinds,) if isinstance(self.kinds, str) else self.kinds
-        if not isinstance(kinds, Sequence) or not kinds:
-            raise TaskError(
-                f"Texture: kinds is {shown(self.kinds)}; it takes some of {', '.join(PATTERNS)}"
-            )
-        for kind in kinds:
-            if kind not in PATTERNS:
-                raise UnknownNameError("pattern", kind, PATTERNS)
-        object.__setattr__(self, "kinds", tuple(kinds))
+        kinds = some_of("Texture: kinds", self.kinds, PATTERNS, "pattern")
+        object.__setattr__(self, "kinds", kinds)
 
     @property
     def drawn(self) -> dict[str, Distribution]:
         """What is drawn: which pattern, by its number in `PATTERNS`, two colours, and a seed."""
-        colors = {name: self.declared[name] for name in ("red", "green", "blue")}
+        colors = {name: self.declared[name] for name in COLORS}
         return {
             "kind": Choice(tuple(PATTERNS.index(kind) for kind in self.kinds)),
             "cells": self.declared["cells"],
@@ -229,39 +224,33 @@ def looks(
         paints: Other paint, of what nothing was drawn for.
     """
     return Looks(
-        {name: _shift(**drawn) for name, drawn in values("cameras").items()},
-        {name: _glow(**drawn) for name, drawn in values("lights").items()},
+        {name: _shift(drawn) for name, drawn in values("cameras").items()},
+        {name: _glow(drawn) for name, drawn in values("lights").items()},
         {**paints, **{part: Paint(**drawn) for part, drawn in values("colors").items()}},
         {name: _pattern(drawn) for name, drawn in values("textures").items()},
     )
 
 
-def _shift(
-    x: float = 0.0,
-    y: float = 0.0,
-    z: float = 0.0,
-    roll: float = 0.0,
-    pitch: float = 0.0,
-    yaw: float = 0.0,
-    fov: float = 1.0,
-) -> Shift:
-    return Shift((x, y, z), (roll, pitch, yaw), fov)
+def _shift(drawn: Mapping[str, float]) -> Shift:
+    moved = _vector(drawn, ("x", "y", "z"), 0.0)
+    turned = _vector(drawn, ("roll", "pitch", "yaw"), 0.0)
+    return Shift(moved, turned, drawn.get("fov", 1.0))
 
 
-def _glow(
-    turn: float = 0.0,
-    tilt: float = 0.0,
-    strength: float = 1.0,
-    red: float = 1.0,
-    green: float = 1.0,
-    blue: float = 1.0,
-) -> Glow:
-    return Glow(turn, tilt, (strength * red, strength * green, strength * blue))
+def _glow(drawn: Mapping[str, float]) -> Glow:
+    strength = drawn.get("strength", 1.0)
+    red, green, blue = _vector(drawn, COLORS, 1.0)
+    color = strength * red, strength * green, strength * blue
+    return Glow(drawn.get("turn", 0.0), drawn.get("tilt", 0.0), color)
 
 
 def _pattern(drawn: Mapping[str, float]) -> Pattern:
-    first, second = (
-        (drawn[f"red{end}"], drawn[f"green{end}"], drawn[f"blue{end}"]) for end in ("", "_2")
-    )
+    first, second = _vector(drawn, COLORS), _vector(drawn, [f"{name}_2" for name in COLORS])
     kind, cells, seed = (int(drawn[name]) for name in ("kind", "cells", "seed"))
     return Pattern(PATTERNS[kind], cells, first, second, seed)
+
+
+def _vector(drawn: Mapping[str, float], names: Sequence[str], default: float = 0.0) -> Vector3:
+    """Return three of the numbers that were drawn; those that do not vary are the default."""
+    first, second, third = (drawn.get(name, default) for name in names)
+    return first, second, third

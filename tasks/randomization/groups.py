@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, ClassVar
 
 from robot_layouts.core.bounds import shown
 from robots import TaskError, UnknownNameError
-from tasks.varying.distributions import Distribution, Fixed, Whole, read_distribution
+from tasks.randomization.distributions import (
+    Distribution,
+    Fixed,
+    LogUniform,
+    Whole,
+    read_distribution,
+)
 
 Declared = Distribution | float | Mapping[str, Any] | None
 """What a field of a `Group` takes: a distribution, a number, or plain data that describes one."""
@@ -49,6 +55,15 @@ class Limits:
                 f" {self.low:g} … {self.high:g} ({self.unit}){_remedy(drawn)}"
             )
         return drawn
+
+
+METRES = Limits(-math.inf, math.inf, "m")
+ANGLE = Limits(-math.inf, math.inf, "rad")
+FRACTION = Limits(0.0, 1.0, "a fraction")
+
+COLORS = ("red", "green", "blue")
+TONES = LogUniform(0.02, 1.0)
+"""Of light: dark, middle and bright tones about as often, as eyes see them."""
 
 
 def _reach(drawn: Distribution) -> str:
@@ -136,3 +151,27 @@ class Group:
     def __str__(self) -> str:
         """Show what is varied."""
         return ", ".join(f"{name} {drawn}" for name, drawn in self.declared.items())
+
+
+def some_of(
+    what: str, given: Sequence[str] | str, choices: Sequence[str], kind: str
+) -> tuple[str, ...]:
+    """Return names that were chosen, or the only one.
+
+    Args:
+        what: The field that they are given for, for messages.
+        given: What was given.
+        choices: All names that there are.
+        kind: What one of them is called.
+
+    Raises:
+        TaskError: If nothing is chosen.
+        UnknownNameError: If there is no such name.
+    """
+    names = (given,) if isinstance(given, str) else given
+    if not isinstance(names, Sequence) or not names:
+        raise TaskError(f"{what} is {shown(given)}; it takes some of {', '.join(choices)}")
+    for name in names:
+        if name not in choices:
+            raise UnknownNameError(kind, name, choices)
+    return tuple(names)

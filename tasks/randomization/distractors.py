@@ -8,18 +8,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, inf, pi, sin
+from math import cos, hypot, pi, sin
 from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
-from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole, shown
-from robot_layouts.simulation import Box, Cylinder, Shape, Sphere, World
-from robot_layouts.simulation.world import BodyKind
-from robots import TaskError, UnknownNameError
+import numpy as np
+
+from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole
+from robot_layouts.simulation import Box, Cylinder, Shape, Simulation, Sphere, State, World
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.scene.looks import Paint
+from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.scene.shapes import Capsule
+from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.world import Body, BodyKind
+from robots import TaskError
 from robots.descriptor import Vector3
-from tasks.varying.distributions import Uniform, as_whole
-from tasks.varying.groups import Declared, Group, Limits
-from tasks.varying.looks import TONES
-from tasks.varying.streams import Stream
+from tasks.randomization.distributions import Distribution, Stream, Uniform, as_whole
+from tasks.randomization.groups import (
+    ANGLE,
+    COLORS,
+    FRACTION,
+    METRES,
+    TONES,
+    Declared,
+    Group,
+    Limits,
+    some_of,
+)
 
 SHAPES = ("box", "ball", "cylinder")
 Kind = Literal["dynamic", "static", "visual"]
@@ -32,9 +47,8 @@ _AROUND = 0.35  # m; how far from the point that people look at, if nothing is d
 _WAITING = 1000.0  # m; beyond what cameras see
 _UPRIGHT = (cos(pi / 4), 0.0, -sin(pi / 4), 0.0)  # wxyz; turns an axis along x to z
 _LEAST_SHARE = 0.5  # of the shorter sides of one, of the longest
-
-_FRACTION = Limits(0.0, 1.0, "a fraction")
-_METRES = Limits(-inf, inf, "m")
+_TRIES = 64  # places that are tried for each
+_GROUND = 1e-3  # m; what ends below this height is what things stand on
 
 
 class Distractor(NamedTuple):
@@ -51,22 +65,6 @@ class Distractor(NamedTuple):
     shape: Shape
     reach: float
     height: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Chance(Group):
-    """What is drawn for one of them, besides its place."""
-
-    rank: Declared
-    yaw: Declared
-    red: Declared
-    green: Declared
-    blue: Declared
-
-    limits: ClassVar[Mapping[str, Limits]] = {
-        **dict.fromkeys(("rank", "red", "green", "blue"), _FRACTION),
-        "yaw": Limits(-inf, inf, "rad"),
-    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,10 +108,10 @@ class Distractors(Group):
     limits: ClassVar[Mapping[str, Limits]] = {
         "count": Limits(0, _MOST, "bodies", whole=True),
         "size": Limits(1e-3, 1.0, "m"),
-        "x": _METRES,
-        "y": _METRES,
-        "yaw": Limits(-inf, inf, "rad"),
-        **dict.fromkeys(("red", "green", "blue"), _FRACTION),
+        "x": METRES,
+        "y": METRES,
+        "yaw": ANGLE,
+        **dict.fromkeys(COLORS, FRACTION),
     }
 
     def __post_init__(self) -> None:
@@ -129,22 +127,15 @@ class Distractors(Group):
         least = int(self.declared["count"].bounds[1])
         bodies = least if self.bodies is None else as_whole(self.bodies)
         checked_whole("Distractors: bodies", bodies, least, _MOST, TaskError)
-        shapes = (self.shapes,) if isinstance(self.shapes, str) else self.shapes
-        if not isinstance(shapes, Sequence) or not shapes:
-            raise TaskError(
-                f"Distractors: shapes is {shown(self.shapes)}; it takes some of {', '.join(SHAPES)}"
-            )
-        for shape in shapes:
-            if shape not in SHAPES:
-                raise UnknownNameError("shape of distractors", shape, SHAPES)
-        for name, value in {"gap": gap, "bodies": bodies, "shapes": tuple(shapes)}.items():
+        shapes = some_of("Distractors: shapes", self.shapes, SHAPES, "shape of distractors")
+        for name, value in {"gap": gap, "bodies": bodies, "shapes": shapes}.items():
             object.__setattr__(self, name, value)
 
     @property
     def drawn(self) -> dict[str, Any]:
         """What is drawn: how many there are, and for each of them its rank, turn and colour."""
-        own = {name: self.declared[name] for name in ("yaw", "red", "green", "blue")}
-        chance = _Chance(rank=Uniform(0.0, 1.0), **own)
+        own = {name: self.declared[name] for name in ("yaw", *COLORS)}
+        chance = {"rank": Uniform(0.0, 1.0), **own}
         return {"count": self.declared["count"], **dict.fromkeys(self.names_of_bodies, chance)}
 
     @property
@@ -195,10 +186,10 @@ def add_distractors(world: World, declared: Distractors) -> None:
     """Add all of them to a world, after the task's own bodies."""
     kind: BodyKind = "dynamic" if declared.kind == "dynamic" else "static"
     for number, one in enumerate(declared.every()):
-        world.add(one.name, one.shape, kind=kind, position=waiting(number))
+        world.add(one.name, one.shape, kind=kind, position=_waiting(number))
 
 
-def waiting(number: int) -> Vector3:
+def _waiting(number: int) -> Vector3:
     """Return where one of them is while an episode does without it (m, world)."""
     return (_WAITING + number, 0.0, _WAITING)
 
@@ -214,3 +205,112 @@ def area_of(outline: Rectangle, looked_at: Vector3) -> Rectangle:
     x_min, y_min, x_max, y_max = outline
     near = max(x_min, x - _AROUND), max(y_min, y - _AROUND)
     return (*near, min(x_max, x + _AROUND), min(y_max, y + _AROUND))
+
+
+# -- where they stand when an episode begins -------------------------------------------------------
+
+
+class Scattering:
+    """Puts distractors into worlds, clear of everything that is there."""
+
+    def __init__(self, declared: Distractors, area: Rectangle) -> None:
+        """Remember what they are, and where they go if nothing is declared."""
+        self._declared, self._every = declared, declared.every()
+        x_min, y_min, x_max, y_max = area
+        self._x: Distribution = declared.declared.get("x", Uniform(x_min, x_max))
+        self._y: Distribution = declared.declared.get("y", Uniform(y_min, y_max))
+
+    def paints(self, drawn: Mapping[str, Any]) -> dict[Part, Paint]:
+        """Return the colours that were drawn."""
+        return {
+            Part(None, one.name): Paint(*(drawn[one.name][c] for c in COLORS))
+            for one in self._every
+        }
+
+    def scatter(
+        self,
+        simulation: Simulation,
+        state: State,
+        drawn: Mapping[int, dict[str, Any]],
+        streams: Sequence[Stream],
+    ) -> None:
+        """Put them where they are clear of everything; the task's bodies are placed already.
+
+        Args:
+            simulation: The worlds.
+            state: What they look like.
+            drawn: What was drawn for them, by world; where they are is added to it.
+            streams: Of every world.
+        """
+        variations: dict[int, Variation] = {}
+        for env, own in drawn.items():
+            taken = _taken(simulation, state, env, {one.name for one in self._every})
+            self._place(simulation.worlds[env], own, taken, streams[env])
+            waits = {Part(None, one.name): not own[one.name]["there"] for one in self._every}
+            variations[env] = Variation(weightless=waits)
+        if self._declared.kind == "dynamic":
+            simulation.vary(variations)
+
+    def _place(self, world: World, drawn: dict[str, Any], taken: Floats, stream: Stream) -> None:
+        ranked = sorted(self._every, key=lambda one: drawn[one.name]["rank"])
+        chosen = {one.name for one in ranked[: drawn["count"]]}
+        drawn["count"] = 0
+        for number, one in enumerate(self._every):
+            place = self._find(one, taken, stream) if one.name in chosen else None
+            x, y, z = _waiting(number) if place is None else (*place, one.height)
+            yaw = drawn[one.name]["yaw"]
+            world.set_pose(one.name, (x, y, z), (cos(yaw / 2), 0.0, 0.0, sin(yaw / 2)))
+            drawn[one.name] |= {"there": int(place is not None), "x": x, "y": y}
+            if place is not None:
+                drawn["count"] += 1
+                taken = np.concatenate([taken, _box(one, *place)[None]])
+
+    def _find(self, one: Distractor, taken: Floats, stream: Stream) -> tuple[float, float] | None:
+        numbers = stream.numbers(2 * _TRIES, "distractors", one.name, "place")
+        gap = self._declared.gap
+        for u, v in zip(numbers[::2], numbers[1::2], strict=True):
+            x, y = self._x.value(u), self._y.value(v)
+            own = _box(one, x, y)
+            apart = (own[0] > taken[:, 1] + gap) | (own[1] < taken[:, 0] - gap)
+            if apart.any(1).all():
+                return x, y
+        return None
+
+
+def _box(one: Distractor, x: float, y: float) -> Floats:
+    """Return the box around one of them at a place: its lowest and its highest corner, (2, 3)."""
+    low = x - one.reach, y - one.reach, 0.0
+    return np.array([low, (x + one.reach, y + one.reach, 2 * one.height)], np.float32)
+
+
+def _taken(simulation: Simulation, state: State, env: int, without: set[str]) -> Floats:
+    """Return the boxes around everything in a world that rises above the table, (K, 2, 3)."""
+    boxes = [
+        box for part, box in simulation.backend.extents(env).items() if part.name not in without
+    ]
+    for body in simulation.worlds[env].bodies.values():
+        if body.name not in without and not any(shape.collides for shape in body.shapes):
+            boxes += _around(body, state.pose(body.name)[env])
+    found = np.array(boxes, np.float32).reshape(-1, 2, 3)
+    return found[found[:, 1, 2] > _GROUND]
+
+
+def _around(body: Body, pose: Floats) -> list[Floats]:
+    """Return a box around a body that touches nothing: a goal, say."""
+    reach = [hypot(*shape.position) + length for shape in body.shapes if (length := _length(shape))]
+    return [np.array([pose[:3] - max(reach), pose[:3] + max(reach)])] if reach else []
+
+
+def _length(shape: Shape) -> float:
+    """Return how far a shape reaches from its middle (m); 0 for what has no end, and for meshes."""
+    match shape:
+        case Box():
+            return hypot(*shape.half_size)
+        case Sphere():
+            return shape.radius
+        case Cylinder():
+            return hypot(shape.radius, shape.half_length)
+        case Capsule():
+            return shape.radius + shape.half_length
+        case _:
+            return 0.0
