@@ -29,13 +29,18 @@ def array_of(value: Any, what: str, error: type[RobotLayoutsError]) -> NDArray[A
         raise error(f"{what} is not an array of numbers: {problem}") from None
 
 
-def leaves(tree: Any, *path: str) -> Iterator[tuple[str, Any]]:
-    """Yield what a nested mapping holds, by the path to it: ``"extra/tcp_pose"``."""
+def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield what a nested mapping holds, by the path to it: ``"extra/tcp_pose"``.
+
+    Args:
+        tree: The mapping, or what one holds.
+        name: What paths begin with.
+    """
     if isinstance(tree, Mapping):
         for key, part in tree.items():
-            yield from leaves(part, *path, key)
+            yield from leaves(part, f"{name}/{key}" if name else f"{key}")
     else:
-        yield "/".join(path), tree
+        yield name, tree
 
 
 def row_of(tree: Any, row: int) -> Any:

@@ -12,30 +12,35 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from torch import Tensor
 
-from layouts import Layout
 from robot_layouts.simulation import Simulation, State, World
 from robot_layouts.simulation.maths import Floats, all_finite
 from robots import SimulationError, TaskError
 from tasks.engine.actions import ActionReader
-from tasks.engine.arguments import (
+from tasks.engine.checks import (
     ELAPSED,
+    ReturnedArrays,
+    ReturnedReward,
     check_info,
     checked_ids,
     checked_seeds,
+    expect_nothing,
+    unchanged,
     wants_rebuild,
 )
-from tasks.engine.bystanders import check_needs, check_places, settled
 from tasks.engine.declared import check_declaration
 from tasks.engine.display import task_html, task_text
-from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
-from tasks.engine.layout_check import is_tested, refuse_collisions
-from tasks.engine.memory import Memory
+from tasks.engine.divergence import (
+    NotFinite,
+    SpeedWatch,
+    refuse_observation,
+    refuse_reward,
+    refuse_state,
+)
 from tasks.engine.observation import Observer, read_mode, space_of
+from tasks.engine.places import built_layout, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
-from tasks.engine.returned import ReturnedArrays, ReturnedReward, expect_nothing, unchanged
 from tasks.engine.scenario import Scenario
-from tasks.engine.speeds import SpeedWatch
-from tasks.engine.task import Info, Task
+from tasks.engine.task import Info, Memory, Task
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.randomization.distractors import add_distractors, area_of
@@ -526,18 +531,3 @@ def _tensors(tree: Any) -> Any:
     if isinstance(tree, dict):
         return {key: _tensors(value) for key, value in tree.items()}
     return _tensor(tree)
-
-
-def built_layout(task_class: type[MultiRobotTask], scenario: Scenario) -> Layout:
-    """Return the layout that environments of a scenario are built with, in its control mode.
-
-    Raises:
-        TaskError: If its places are not the task's, or a robot lacks what its place needs.
-        DescriptorError: If a robot lacks the joint limits that the control mode needs.
-    """
-    name, given, places = task_class.__name__, scenario.layout, task_class.layout.places
-    counts, needs = task_class.robot_counts, task_class.needs
-    check_places(name, given, places, counts, scenario.bystanders)
-    check_needs(name, given, given.places if counts else places, needs)
-    still = settled(given, places, counts, scenario.bystanders)
-    return still.in_control_mode(scenario.control_mode)

@@ -26,7 +26,7 @@ from tasks.engine.columns import (
     Viewpoint,
     picture_column,
 )
-from tasks.engine.finite import NotFinite
+from tasks.engine.divergence import NotFinite
 from tasks.native import controllers
 from tasks.native.format import observation_keys
 from tasks.randomization.noise import Noisy

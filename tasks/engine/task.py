@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,8 +11,8 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.simulation import Camera, PhysicsSettings, Simulation, State, World
-from robot_layouts.simulation.maths import Array, Floats
-from tasks.engine.memory import Memory
+from robot_layouts.simulation.maths import Array, Floats, copy
+from robots import UnknownNameError
 from tasks.engine.scenario import Scenario
 from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
 from tasks.language.needs import Needs
@@ -26,6 +27,39 @@ Info = dict[str, Any]
 DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
 SPARSE_MODES = ("sparse", "none")
 _NORMAL = Normal(1.0)
+
+
+class Memory(SimpleNamespace):
+    """Arrays by name, (N, …) each, as attributes."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse what is not there.
+
+        Raises:
+            NotRememberedError: Always.
+        """
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise NotRememberedError("array that remember() returned", name, vars(self))
+
+    def renew(self, fresh: Mapping[str, Array], env_ids: Sequence[int]) -> None:
+        """Take the rows of environments that were reset; the others stay.
+
+        Args:
+            fresh: Every array, with all rows; those of ``env_ids`` are taken.
+            env_ids: Which environments.
+        """
+        for name, rows in fresh.items():
+            if name not in vars(self) or len(env_ids) == len(rows):
+                setattr(self, name, copy(rows))
+            else:
+                kept = copy(getattr(self, name))  # somebody may hold the earlier one
+                kept[list(env_ids)] = rows[list(env_ids)]
+                setattr(self, name, kept)
+
+
+class NotRememberedError(UnknownNameError, AttributeError):
+    """An array that the task does not remember (also an ``AttributeError``)."""
 
 
 class Task:

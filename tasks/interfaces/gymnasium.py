@@ -11,7 +11,7 @@ from gymnasium import logger
 from numpy.typing import NDArray
 
 from robots import TaskError
-from tasks.engine.arguments import RECONFIGURE, SEED, SUCCESS, checked_seeds, own_options
+from tasks.engine.checks import RECONFIGURE, SEED, SUCCESS, checked_seeds, own_options
 from tasks.engine.observation import observed_dtype, space_of
 from tasks.engine.remade import Remade
 from tasks.language.randomness import FirstSeeds

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from robots import TaskError, unknown_name_message
 from tasks.description import instruction_of
-from tasks.engine.arguments import RECONFIGURE, SUCCESS
+from tasks.engine.checks import RECONFIGURE, SUCCESS
 from tasks.engine.remade import Remade
-from tasks.fronts.vector import UnknownAttributeError, VectorTask
+from tasks.interfaces.vector import UnknownAttributeError, VectorTask
 from tasks.registry import get_task_class
 
 OBS_MODES = ("lerobot", "lerobot+video", "lerobot+cameras")

@@ -1,16 +1,35 @@
-"""Which robots of a layout have a place in a task, and what the others do."""
+"""Which layouts a task takes: its places are filled with what they need, and nothing collides."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 
 from layouts import Layout
-from robots import RobotDescriptor, TaskError
+from robots import LayoutError, MissingPackageError, RobotDescriptor, TaskError
+from tasks.engine.scenario import Scenario
+from tasks.engine.task import Task
 from tasks.language.needs import ACT, HOLD, Needs
 
-BYSTANDERS = (None, HOLD, ACT)
 EVERY_PLACE = "*"  # key of a task's needs
+Rectangle = tuple[float, float, float, float]
+
+
+def built_layout(task_class: type[Task], scenario: Scenario) -> Layout:
+    """Return the layout that environments of a scenario are built with, in its control mode.
+
+    Raises:
+        TaskError: If its places are not the task's, or a robot lacks what its place needs.
+        DescriptorError: If a robot lacks the joint limits that the control mode needs.
+    """
+    name, given, places = task_class.__name__, scenario.layout, task_class.layout.places
+    counts, needs = task_class.robot_counts, task_class.needs
+    check_places(name, given, places, counts, scenario.bystanders)
+    check_needs(name, given, given.places if counts else places, needs)
+    still = _settled(given, places, counts, scenario.bystanders)
+    return still.in_control_mode(scenario.control_mode)
 
 
 def check_places(
@@ -82,7 +101,7 @@ def check_needs(
         raise TaskError(f"{task}, place {'; place '.join(lacking)}")
 
 
-def settled(
+def _settled(
     layout: Layout, places: Collection[str], robot_counts: range | None, bystanders: str | None
 ) -> Layout:
     """Return a layout in which the robots and limbs without a place hold still, if they are to."""
@@ -105,3 +124,45 @@ def _holding(layout: Layout, arm: str, still: Sequence[str]) -> RobotDescriptor:
     declared = robot.declared_split and robot.declared_split.held(*others)
     split = robot.action_split.held(*others)
     return replace(robot, action_split=split, declared_split=declared, limbs=limbs)
+
+
+def refuse_collisions(layout: Layout, table: Rectangle | None = None) -> None:
+    """Refuse a layout whose robots collide with each other, themselves or a table.
+
+    Looks at their keyframes and at some draws of joint noise. The verdict on a layout is
+    remembered. Where python-fcl is not installed it cannot look, and warns instead.
+
+    Args:
+        layout: The layout; the tables among its frames count.
+        table: Outline of the task's own table, whose top is at z = 0: x_min, y_min, x_max, y_max
+            (m); None if it has none.
+
+    Raises:
+        LayoutError: If robots collide; names the links, and says what to change.
+        AssetError: If robot files cannot be found.
+    """
+    try:
+        collisions = _collisions(layout, table)
+    except MissingPackageError as error:
+        warnings.warn(
+            f"the layout is built unchecked: {error} (or say so, with check_layout=False)",
+            stacklevel=2,
+        )
+        return
+    if collisions:
+        raise LayoutError(
+            f"the robots of this layout collide:\n{collisions}\n"
+            "check_layout=False builds it all the same; layout.validate() gives the details"
+        )
+
+
+def is_tested(cls: type[Task], layout: Layout) -> bool:
+    """Tell whether a layout is the own one of a task of this library, which its tests check."""
+    return cls.__module__.startswith("tasks.") and layout == cls.layout
+
+
+@lru_cache(maxsize=256)
+def _collisions(layout: Layout, table: Rectangle | None) -> str:
+    findings = layout.validate(workspaces=False, table=table).findings
+    kinds = ("collision", "self-collision", "table")
+    return "\n".join(str(found) for found in findings if found.serious and found.kind in kinds)

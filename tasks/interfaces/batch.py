@@ -13,11 +13,12 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from robots import TaskError
-from tasks.engine.arguments import RECONFIGURE, SEED
+from tasks.arrays import leaves
+from tasks.engine.checks import RECONFIGURE, SEED
 from tasks.engine.env import MultiRobotTask
 from tasks.engine.observation import observed_dtype
 from tasks.engine.scenario import Scenario
-from tasks.fronts.gymnasium import as_array
+from tasks.interfaces.gymnasium import as_array
 
 Arrays = dict[str, NDArray[Any]]
 Shapes = Mapping[str, tuple[tuple[int, ...], str]]
@@ -191,19 +192,12 @@ class Batch:
 
 def _named(obs: Any, info: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[Any]]]:
     """Go through observation and info by the names of their arrays."""
-    yield from _leaves(OBSERVATION, obs)
+    for name, value in leaves(obs, OBSERVATION):
+        array = as_array(value)
+        yield name, array.astype(observed_dtype(array), copy=False)
     for key, value in info.items():
         if key != RECONFIGURE:  # which is no single environment's
             yield f"{INFO}/{key}", as_array(value)
-
-
-def _leaves(name: str, tree: Any) -> Iterator[tuple[str, NDArray[Any]]]:
-    if isinstance(tree, Mapping):
-        for key, part in tree.items():
-            yield from _leaves(f"{name}/{key}", part)
-    else:
-        array = as_array(tree)
-        yield name, array.astype(observed_dtype(array), copy=False)
 
 
 # -- the memory of a vector ----------------------------------------------------------------------

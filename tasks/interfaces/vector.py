@@ -17,19 +17,21 @@ from numpy.typing import NDArray
 
 from robot_layouts.core.bounds import checked_whole
 from robots import SimulationError, TaskError, UnknownNameError, unknown_name_message
+from tasks.arrays import row_of
 from tasks.engine.actions import ActionReader
-from tasks.engine.arguments import RECONFIGURE, checked_options, checked_seeds
-from tasks.engine.env import built_layout
+from tasks.engine.checks import RECONFIGURE, SUCCESS, checked_options, checked_seeds
 from tasks.engine.observation import space_of
+from tasks.engine.places import built_layout
 from tasks.engine.remade import Remade
-from tasks.fronts.batch import Part
-from tasks.fronts.gymnasium import RENDER_MODES
-from tasks.fronts.results import Results
-from tasks.fronts.workers import InProcess, WorkerError, Workers, shared_out
+from tasks.interfaces.batch import FINAL, INFO, OBSERVATION, Part
+from tasks.interfaces.gymnasium import RENDER_MODES
+from tasks.interfaces.workers import InProcess, WorkerError, Workers, partition
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
 
 _Flags = NDArray[np.bool_]
+_Rows = slice | NDArray[np.intp]  # numbers of environments, in ascending order
+_ALL = slice(None)
 _Arguments = ParamSpec("_Arguments")
 _Result = TypeVar("_Result")
 
@@ -38,7 +40,7 @@ class UnknownAttributeError(UnknownNameError, AttributeError):
     """An attribute that environments of a batch do not have (also an ``AttributeError``)."""
 
 
-def _alone(
+def _one_thread(
     method: Callable[Concatenate[VectorTask, _Arguments], _Result],
 ) -> Callable[Concatenate[VectorTask, _Arguments], _Result]:
     """Let one thread at a time call a vector: a second would read the first one's answers."""
@@ -138,23 +140,23 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._first = FirstSeeds(num_envs)
         self._everywhere = np.ones(num_envs, bool)
         self.batch_size = _checked_batch_size(batch_size, num_envs)
-        shares = [
-            [Part(cls, scenario, ids.start, ids.stop, mode, ignore_terminations) for ids in share]
-            for share in shared_out(num_envs, workers, self.batch_size)
+        parts = [
+            [Part(cls, scenario, ids.start, ids.stop, mode, ignore_terminations) for ids in own]
+            for own in partition(num_envs, workers, self.batch_size)
         ]
         for placement in layout.values():  # fetched here, not by all workers at once
             placement.robot.urdf.locate(pictures=scenario.draws)
         self._process = os.getpid()
-        self._holder = Workers(shares, timeout, self._seeds) if workers else InProcess(shares[0])
-        self._close = weakref.finalize(self, self._holder.close)
-        self._results = Results(self._holder, num_envs)
+        self._backend = Workers(parts, timeout, self._seeds) if workers else InProcess(parts[0])
+        self._close = weakref.finalize(self, self._backend.close)
+        self._results = _Results(self._backend, num_envs)
         low, high = np.array(layout.action_bounds, np.float32).T
         self.single_action_space = Box(low, high, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.single_observation_space = space_of(self._results.observation(), batched=True)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 
-    @_alone
+    @_one_thread
     def reset(
         self,
         *,
@@ -183,13 +185,15 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         if seed is None or isinstance(seed, int):
             super().reset(seed=seed)
         ids = np.flatnonzero(mask).tolist()
-        self._call("reset", self._beginnings(ids, seeds, reconfigure), lambda: self._begun(mask))
-        self._holder.pending.forget(ids)
+        self._call(
+            "reset", self._reset_arguments(ids, seeds, reconfigure), lambda: self._after_reset(mask)
+        )
+        self._backend.pending.forget(ids)
         self._first.given(ids)
-        self._note(ids, seeds)
-        return self._begun(mask)
+        self._keep_seeds(ids, seeds)
+        return self._after_reset(mask)
 
-    @_alone
+    @_one_thread
     def step(self, actions: Any) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
         """Advance every environment by one control step.
 
@@ -206,12 +210,12 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             WorkerError: If workers die, hang or fail; its ``results`` are what the others give.
         """
         self._expect_workers()
-        self._expect_idle(self._holder.pending.env_ids)
-        self._holder.arrays["action"][:] = self._reader.read(actions)
-        self._call("step", {i: () for i in range(len(self._holder.parts))}, self._results.step)
+        self._expect_idle(self._backend.pending.env_ids)
+        self._backend.arrays["action"][:] = self._reader.read(actions)
+        self._call("step", {i: () for i in range(len(self._backend.parts))}, self._results.step)
         return self._results.step()
 
-    @_alone
+    @_one_thread
     def send(self, actions: Any, env_ids: Sequence[int] | NDArray[np.integer[Any]]) -> None:
         """Let some environments take a step, and wait for none.
 
@@ -227,13 +231,13 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         """
         self._expect_workers()
         ids = self._checked_ids(env_ids)
-        self._expect_idle(set(self._holder.pending.env_ids).intersection(ids.tolist()))
+        self._expect_idle(set(self._backend.pending.env_ids).intersection(ids.tolist()))
         rows = self._reader.read(actions, ids)
-        self._holder.arrays["action"][ids] = rows
+        self._backend.arrays["action"][ids] = rows
         for part, own in self._by_part(ids):
-            self._holder.send(part, own)
+            self._backend.send(part, own)
 
-    @_alone
+    @_one_thread
     def recv(self) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
         """Wait until ``batch_size`` environments have taken the step that they were sent.
 
@@ -250,16 +254,16 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 after `restart`.
         """
         self._expect_workers()
-        if (sent := len(self._holder.pending.env_ids)) < self.batch_size:
+        if (sent := len(self._backend.pending.env_ids)) < self.batch_size:
             raise SimulationError(
                 f"recv() returns {self.batch_size} environments, and {sent} were sent actions;"
                 " send() more, or make the vector with a smaller batch_size"
             )
-        ids = np.array(self._holder.take(self.batch_size))
+        ids = np.array(self._backend.take(self.batch_size))
         obs, reward, terminated, truncated, info = self._results.step(ids)
         return obs, reward, terminated, truncated, {**info, "env_id": ids}
 
-    @_alone
+    @_one_thread
     def restart(self, seed: Mapping[int, int] | None = None) -> tuple[Any, dict[str, Any]]:
         """Replace the workers that are gone; their environments begin new episodes.
 
@@ -275,20 +279,20 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             WorkerError: If a worker ends before it is ready; another attempt is allowed.
         """
         self._expect_open()
-        gone = sorted(self._holder.failures)
-        ids = [i for worker in gone for i in self._holder.env_ids(worker)]
+        gone = sorted(self._backend.failures)
+        ids = [i for worker in gone for i in self._backend.env_ids(worker)]
         given = dict(seed or {})
         if wrong := [i for i in given if i not in ids]:
             raise TaskError(f"environments {wrong} are not gone; those that are: {ids}")
         wanted = [given.get(i, own) for i, own in enumerate(self._seeds)]
         seeds = checked_seeds(wanted, range(self.num_envs))
         if gone:
-            self._holder.restart(gone)
-        self._holder.call("reset", self._beginnings(ids, seeds, reconfigure=False))
-        self._note(ids, seeds)
-        return self._begun(self._everywhere)
+            self._backend.restart(gone)
+        self._backend.call("reset", self._reset_arguments(ids, seeds, reconfigure=False))
+        self._keep_seeds(ids, seeds)
+        return self._after_reset(self._everywhere)
 
-    @_alone
+    @_one_thread
     def render(self) -> tuple[NDArray[np.uint8], ...]:  # type: ignore[override]
         """Return a picture of every environment, (512, 512, 3) uint8 each.
 
@@ -298,11 +302,11 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         """
         if self.render_mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
-        everyone = {i: () for i in range(len(self._holder.parts))}
+        everyone = {i: () for i in range(len(self._backend.parts))}
         pictures = self._call("render", everyone, lambda: None)
         return tuple(picture for i in everyone for picture in pictures[i])
 
-    @_alone
+    @_one_thread
     def close_extras(self, **kwargs: Any) -> None:
         """End the workers and let the shared memory go."""
         self._close()
@@ -317,7 +321,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     ) -> dict[int, Any]:
         self._expect_workers()
         try:
-            return self._holder.call(method, arguments)
+            return self._backend.call(method, arguments)
         except WorkerError as error:
             error.results = results()
             raise
@@ -333,8 +337,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
     def _expect_workers(self) -> None:
         self._expect_open()
-        if isinstance(self._holder, Workers) and self._holder.failures:
-            raise self._holder.error(list(self._holder.failures.values()))
+        if isinstance(self._backend, Workers) and self._backend.failures:
+            raise self._backend.error(list(self._backend.failures.values()))
 
     def _expect_idle(self, sent: Collection[int]) -> None:
         if sent:
@@ -342,13 +346,13 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 f"environments {sorted(sent)} were sent actions before; recv() them first"
             )
 
-    def _beginnings(
+    def _reset_arguments(
         self, ids: list[int], seeds: list[int | None], reconfigure: bool
     ) -> dict[int, tuple[Any, ...]]:
         """Return what the parts that environments are in are reset with; see `Batch.reset`."""
         return {
             number: (
-                [i - self._holder.parts[number].start for i in own],
+                [i - self._backend.parts[number].start for i in own],
                 [seeds[i] for i in own],
                 reconfigure,
             )
@@ -359,18 +363,18 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         """Yield the parts that environments are in, by number, and which of them are in each."""
         chosen = np.zeros(self.num_envs, bool)
         chosen[env_ids] = True
-        for number, part in enumerate(self._holder.parts):
+        for number, part in enumerate(self._backend.parts):
             own = chosen[part.start : part.stop].nonzero()[0]
             if len(own):
                 yield number, (own + part.start).tolist()
 
-    def _note(self, ids: list[int], seeds: list[int | None]) -> None:
+    def _keep_seeds(self, ids: list[int], seeds: list[int | None]) -> None:
         for i in ids:
             seed = seeds[i]
             if seed is not None:
                 self._seeds[i] = seed
 
-    def _begun(self, mask: _Flags) -> tuple[Any, dict[str, Any]]:
+    def _after_reset(self, mask: _Flags) -> tuple[Any, dict[str, Any]]:
         return self._results.observation(), self._results.info(mask)
 
     # -- checks ------------------------------------------------------------------------------
@@ -428,3 +432,83 @@ def _checked_batch_size(batch_size: int | None, num_envs: int) -> int:
     if batch_size is None:
         return num_envs
     return checked_whole("batch_size", batch_size, 1, num_envs, TaskError)
+
+
+class _Results:
+    """Copies what the arrays say of environments, in the form of Gymnasium's vectors."""
+
+    def __init__(self, backend: InProcess | Workers, num_envs: int) -> None:
+        """Take what has the arrays, and how many environments they are of."""
+        self._backend = backend
+        self._everywhere = np.ones(num_envs, bool)
+        self._names: dict[str, list[tuple[str, str]]] = {}
+
+    def step(
+        self, ids: _Rows = _ALL
+    ) -> tuple[Any, NDArray[np.float32], _Flags, _Flags, dict[str, Any]]:
+        """Return what a step has given for some environments."""
+        arrays = self._backend.arrays
+        info = self.info(self._everywhere[ids], ids)
+        restarted = arrays.get("restarted")
+        if restarted is not None and restarted[ids].any():
+            info.update(self._final(restarted[ids].copy(), ids))
+        flags = (arrays[name][ids].copy() for name in ("reward", "terminated", "truncated"))
+        return self.observation(ids), *flags, info
+
+    def observation(self, ids: _Rows = _ALL, prefix: str = "") -> Any:
+        """Return what is observed of some environments, or of those that ended (`FINAL`)."""
+        arrays = self._backend.arrays
+        if prefix + OBSERVATION in arrays:
+            return arrays[prefix + OBSERVATION][ids].copy()
+        tree: dict[str, Any] = {}
+        for name, array in arrays.items():
+            first, *way = name.split("/")
+            if first == prefix + OBSERVATION:
+                branch = tree
+                for key in way[:-1]:
+                    branch = branch.setdefault(key, {})
+                branch[way[-1]] = array[ids].copy()
+        return tree or np.empty((len(self._everywhere[ids]), 0), np.float32)
+
+    def info(self, mask: _Flags, ids: _Rows = _ALL, prefix: str = INFO) -> dict[str, Any]:
+        """Return the info of some environments, as Gymnasium's own vectors return it.
+
+        Args:
+            mask: Which of these environments it is about.
+            ids: The environments.
+            prefix: What the names of the arrays begin with.
+        """
+        info: dict[str, Any] = {}
+        everywhere = mask.all()
+        for key, array in self._entries(prefix):
+            info[key] = array[ids].copy()
+            if not everywhere:
+                info[key][~mask] = 0
+            info[f"_{key}"] = mask.copy()
+        return info
+
+    def _entries(self, prefix: str) -> list[tuple[str, NDArray[Any]]]:
+        """Return the arrays whose names begin with a prefix, and what info calls them."""
+        if prefix not in self._names:
+            found = [
+                (called, name)
+                for name in self._backend.arrays
+                for first, _, key in [name.partition("/")]
+                if first == prefix
+                for called in ((key, SUCCESS) if key == "success" else (key,))
+            ]
+            self._names[prefix] = found
+        arrays = self._backend.arrays
+        return [(called, arrays[name]) for called, name in self._names[prefix]]
+
+    def _final(self, ended: _Flags, ids: _Rows) -> dict[str, Any]:
+        observations = np.full(len(ended), None, object)
+        batch = self.observation(ids, FINAL)
+        for i in np.flatnonzero(ended).tolist():
+            observations[i] = row_of(batch, i)
+        return {
+            "final_obs": observations,
+            "_final_obs": ended,
+            "final_info": self.info(ended, ids, FINAL + INFO),
+            "_final_info": ended.copy(),
+        }

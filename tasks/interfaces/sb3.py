@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NoReturn
 
 import gymnasium
@@ -18,10 +18,11 @@ from stable_baselines3.common.vec_env.base_vec_env import (
 )
 
 from robots import SimulationError, TaskError
-from tasks.engine.arguments import RECONFIGURE, own_options
+from tasks.arrays import leaves
+from tasks.engine.checks import RECONFIGURE, own_options
 from tasks.engine.remade import Remade
-from tasks.fronts.spec import NAMESPACE
-from tasks.fronts.vector import UnknownAttributeError, VectorTask
+from tasks.interfaces.spec import NAMESPACE
+from tasks.interfaces.vector import UnknownAttributeError, VectorTask
 from tasks.registry import get_task_class
 
 
@@ -205,17 +206,8 @@ def _rows(info: Mapping[str, Any], num_envs: int) -> list[dict[str, Any]]:
 
 
 def _flat_space(space: Space[Any]) -> Space[Any]:
-    return Dict(dict(_leaves(space, ""))) if isinstance(space, Dict) else space
+    return Dict(dict(leaves(space))) if isinstance(space, Dict) else space
 
 
 def _flat(observation: Any) -> Any:
-    return dict(_leaves(observation, "")) if isinstance(observation, Mapping) else observation
-
-
-def _leaves(tree: Any, way: str) -> Iterator[tuple[str, Any]]:
-    """Go through a nested mapping by the way to each of its leaves."""
-    if isinstance(tree, Mapping):
-        for key, part in tree.items():
-            yield from _leaves(part, f"{way}/{key}" if way else key)
-    else:
-        yield way, tree
+    return dict(leaves(observation)) if isinstance(observation, Mapping) else observation

@@ -15,7 +15,7 @@ from robot_layouts.core.bounds import shown
 from robots import TaskError, UnknownNameError
 from tasks.engine.columns import COLUMN_MODES
 from tasks.engine.observation import SEEN_COLUMNS, space_of
-from tasks.fronts.gymnasium import OneEnvironment, info_row, row
+from tasks.interfaces.gymnasium import OneEnvironment, info_row, row
 from tasks.native.controllers import CONTROLLER
 from tasks.native.format import native_places, observation_keys
 

@@ -10,13 +10,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from robots import MissingPackageError
-from tasks.fronts.spec import NAMESPACE, TaskSpec
+from tasks.interfaces.spec import NAMESPACE, TaskSpec
 from tasks.registry import list_own, list_tasks
 
 if TYPE_CHECKING:
-    from tasks.fronts.lerobot import LeRobotTask
-    from tasks.fronts.parallel import ParallelTask
-    from tasks.fronts.sb3 import SB3Task
+    from tasks.interfaces.lerobot import LeRobotTask
+    from tasks.interfaces.parallel import ParallelTask
+    from tasks.interfaces.sb3 import SB3Task
 
 _GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
 
@@ -39,8 +39,8 @@ def register() -> None:
         if _GYMNASIUM_NAME.fullmatch(task_id) and name not in registry:
             registry[name] = TaskSpec(
                 name,
-                entry_point="tasks.fronts.gymnasium:GymnasiumTask",
-                vector_entry_point="tasks.fronts.vector:VectorTask",
+                entry_point="tasks.interfaces.gymnasium:GymnasiumTask",
+                vector_entry_point="tasks.interfaces.vector:VectorTask",
                 kwargs={"task_id": task_id},
             )
 
@@ -63,7 +63,7 @@ def parallel_env(
         TaskError: If the task cannot be made like that.
     """
     try:
-        from tasks.fronts.parallel import ParallelTask
+        from tasks.interfaces.parallel import ParallelTask
     except ModuleNotFoundError as error:
         if error.name != "pettingzoo":
             raise
@@ -97,7 +97,7 @@ def sb3_vec_env(
         WorkerError: If a worker ends before it is ready.
     """
     try:
-        from tasks.fronts.sb3 import SB3Task
+        from tasks.interfaces.sb3 import SB3Task
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] != "stable_baselines3":
             raise
@@ -130,6 +130,6 @@ def lerobot_vec_env(
         AssetError: If robot files cannot be found.
         WorkerError: If a worker ends before it is ready.
     """
-    from tasks.fronts.lerobot import LeRobotTask
+    from tasks.interfaces.lerobot import LeRobotTask
 
     return LeRobotTask(task_id, num_envs, num_workers=num_workers, **fields)

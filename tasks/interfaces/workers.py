@@ -1,4 +1,4 @@
-"""Who holds the environments of a vector: worker processes, or this process."""
+"""Where the environments of a vector are: in worker processes, or in this one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robot_layouts.core.processes.worker import (
     Worker,
     receive_descriptor,
 )
-from tasks.fronts.batch import (
+from tasks.interfaces.batch import (
     Arrays,
     Batch,
     Part,
@@ -146,7 +146,7 @@ class Pending:
         self._steps = [(request, own) for request, own in left if own]
 
 
-def shared_out(num_envs: int, num_workers: int, batch_size: int) -> list[list[range]]:
+def partition(num_envs: int, num_workers: int, batch_size: int) -> list[list[range]]:
     """Return, for each worker, the environments of each of its parts.
 
     Every worker holds some consecutive ones, in parts no larger than what `recv` returns. A worker
@@ -231,12 +231,12 @@ class Workers:
     """
 
     def __init__(
-        self, shares: Sequence[Sequence[Part]], timeout: float | None, seeds: Sequence[int]
+        self, by_worker: Sequence[Sequence[Part]], timeout: float | None, seeds: Sequence[int]
     ) -> None:
         """Start the processes and wait until their worlds are built.
 
         Args:
-            shares: The parts that each worker holds, the environments in order.
+            by_worker: The parts that each worker holds, the environments in order.
             timeout: Seconds that workers may take for a reply; None waits for ever.
             seeds: The last seed of every environment, which errors name.
 
@@ -244,21 +244,21 @@ class Workers:
             WorkerError: If a worker ends before it is ready.
             RobotLayoutsError: What a worker could not make its task for, or what ran out.
         """
-        self.parts = [part for share in shares for part in share]
+        self.parts = [part for own in by_worker for part in own]
         self.arrays: Arrays = {}
         self.failures: dict[int, Failure] = {}
         self.pending = Pending()
         self.pool, self.workers = Pool(), dict[int, Worker]()
         self.timeout = timeout
-        self._shares, self._seeds = shares, seeds
-        self._places = [(i, k) for i, share in enumerate(shares) for k in range(len(share))]
+        self._by_worker, self._seeds = by_worker, seeds
+        self._places = [(i, k) for i, own in enumerate(by_worker) for k in range(len(own))]
         self._open: dict[int, list[Request]] = {}  # not replied to yet, in order
         self._shapes: Shapes = {}
         self._descriptor = -1
         self._made = False
         self._interrupted = False  # a reply that was waited for may have been missed
         try:
-            self.restart(range(len(shares)))
+            self.restart(range(len(by_worker)))
         except BaseException:
             self.close()
             raise
@@ -266,8 +266,8 @@ class Workers:
 
     def env_ids(self, worker: int) -> range:
         """Return the numbers of the environments that a worker holds."""
-        share = self._shares[worker]
-        return range(share[0].start, share[-1].stop)
+        own = self._by_worker[worker]
+        return range(own[0].start, own[-1].stop)
 
     def restart(self, numbers: Sequence[int]) -> None:
         """Start workers, in the place of those that are gone.
@@ -286,7 +286,7 @@ class Workers:
                 self._results(attached, START_SECONDS)
         except BaseException:
             for i in numbers:
-                self._end(i)
+                self._remove(i)
             raise
         for i in numbers:
             self.failures.pop(i, None)
@@ -344,8 +344,8 @@ class Workers:
     # -- inside ------------------------------------------------------------------------------
 
     def _spawn(self, number: int) -> Request:
-        self._end(number)  # Ctrl-C may have come before that
-        made = _Batches(self._shares[number])
+        self._remove(number)  # Ctrl-C may have come before that
+        made = _Batches(self._by_worker[number])
         self.workers[number] = self.pool.spawn(packed(made), self.timeout)
         self._open[number] = [Request(MAKE, "")]
         return self._ask(number, None, "shapes", ())
@@ -390,10 +390,10 @@ class Workers:
             left = None if deadline is None else max(0.0, deadline - time.monotonic())
             numbers = {worker: i for i, worker in self.workers.items()}
             replies = self.pool.wait(left)
-            failures += [f for w, r in replies if (f := self._take(numbers[w], r)) is not None]
+            failures += [f for w, r in replies if (f := self._handle(numbers[w], r)) is not None]
             if not replies and left == 0.0:
                 late = f"did not reply within {timeout:g} s and was ended"
-                failures += [self._lose(i, late) for i, open_ in self._open.items() if open_]
+                failures += [self._drop(i, late) for i, open_ in self._open.items() if open_]
         self._interrupted = False
         if failures:
             raise self.error(sorted(failures, key=lambda failure: failure.worker))
@@ -403,16 +403,16 @@ class Workers:
         hint = "restart() replaces what is gone; the other environments are untouched"
         return WorkerError(failures, self._seeds, hint if self._made else "no vector was made")
 
-    def _take(self, number: int, reply: Reply) -> Failure | None:
+    def _handle(self, number: int, reply: Reply) -> Failure | None:
         """Note what a worker replied; returns a failure if it can go on no more.
 
         Raises:
             RobotLayoutsError: What it could not make its task for.
         """
         if reply.status is Status.DIED:
-            return self._lose(number, reply.value)
+            return self._drop(number, reply.value)
         if reply.status is Status.FAILED:
-            return self._fail(number, reply)
+            return self._handle_error(number, reply)
         for request in self._open[number]:
             if request.number == reply.request:
                 request.result = reply.value
@@ -420,7 +420,7 @@ class Workers:
         self._open[number] = [request for request in self._open[number] if not request.done]
         return None
 
-    def _fail(self, number: int, reply: Reply) -> Failure:
+    def _handle_error(self, number: int, reply: Reply) -> Failure:
         error, methods = reply.value, {r.number: r.method for r in self._open[number]}
         ours = not isinstance(error, RemoteError)
         if reply.request == MAKE and ours:
@@ -429,17 +429,17 @@ class Workers:
         method = methods.get(reply.request, "an earlier call")
         call = "making its task" if reply.request == MAKE else f"{method}()"
         where = error.__cause__.args if error.__cause__ else ()
-        return self._lose(number, f"failed in {call} with {what}", *where)
+        return self._drop(number, f"failed in {call} with {what}", *where)
 
-    def _lose(self, number: int, reason: str, where: str = "") -> Failure:
+    def _drop(self, number: int, reason: str, where: str = "") -> Failure:
         reason = f"{self.workers[number].name} {reason}"
         failure = Failure(number, self.env_ids(number), reason, where)
         self.failures[number] = failure
         self.pending.forget(self.env_ids(number))
-        self._end(number)
+        self._remove(number)
         return failure
 
-    def _end(self, number: int) -> None:
+    def _remove(self, number: int) -> None:
         if number in self.workers:
             self._open[number] = []
             self.pool.remove(self.workers[number])
