@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from math import inf, pi
 from os import PathLike
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, TypeAlias
 
 import yaml
 
@@ -19,7 +19,7 @@ from robot_layouts.core.yaml_text import WordLoader, compose
 from robots import RobotLayoutsError, TaskError, UnknownNameError, UnreadableFileError
 from tasks.randomization.distractors import Distractors
 from tasks.randomization.distributions import Distribution
-from tasks.randomization.groups import Group, Limits
+from tasks.randomization.groups import Declared, Group, Limits
 from tasks.randomization.looks import CameraShift, Light, Surface, Texture
 
 MAX_LENGTH = 1 << 18  # bytes of a file
@@ -59,6 +59,9 @@ class Axis:
         return {name: self.takes.read(given, f"{what} of {name!r}") for name, given in data.items()}
 
 
+_Metres: TypeAlias = Annotated[Declared, Limits(-100.0, 100.0, "m")]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Shift(Group):
     """How a robot's base is off its placement, in the world or in what it hangs on.
@@ -70,46 +73,26 @@ class Shift(Group):
         yaw: Turn about z, at its own place (rad).
     """
 
-    x: Distribution | None = None
-    y: Distribution | None = None
-    z: Distribution | None = None
-    yaw: Distribution | None = None
-
-    limits: ClassVar[Mapping[str, Limits]] = {
-        **dict.fromkeys(("x", "y", "z"), Limits(-100.0, 100.0, "m")),
-        "yaw": Limits(-2 * pi, 2 * pi, "rad"),
-    }
+    x: _Metres = None
+    y: _Metres = None
+    z: _Metres = None
+    yaw: Annotated[Declared, Limits(-2 * pi, 2 * pi, "rad")] = None
 
 
 _FACTOR = Limits(1e-3, 1e3, "factor on what is declared")
 _COEFFICIENT = Limits(0.0, 1e3, "coefficient of friction")
 _STEPS = Limits(0, 1000, "control steps", whole=True)
 _NOISE = Limits(-inf, inf, "added to the number")
-
-AXES = {
-    "mass": Axis(_FACTOR),
-    "friction": Axis(_COEFFICIENT),
-    "size": Axis(Limits(0.01, 100.0, "factor on what is declared"), rebuilds=True),
-    "stiffness": Axis(_FACTOR),
-    "damping": Axis(_FACTOR),
-    "joint_friction": Axis(_COEFFICIENT),
-    "gravity": Axis(Limits(0.0, 1000.0, "m/s²"), named=False, rebuilds=True),
-    "bases": Axis(Shift),
-    "cameras": Axis(CameraShift),
-    "lights": Axis(Light),
-    "colors": Axis(Surface),
-    "textures": Axis(Texture),
-    "distractors": Axis(Distractors, named=False),
-    "action_noise": Axis(_NOISE),
-    "action_delay": Axis(_STEPS, named=False),
-    "sensor_noise": Axis(_NOISE),
-    "observation_delay": Axis(_STEPS, named=False),
-}
-"""Every axis by its field in `tasks.Randomization`, in the order in which they are shown."""
+_SIZE = Limits(0.01, 100.0, "factor on what is declared")
+_GRAVITY = Limits(0.0, 1000.0, "m/s²")
 
 
-def _by_name() -> Any:
-    return field(default_factory=dict[str, Any])
+def _axis(takes: Limits | type[Group], *, named: bool = True, rebuilds: bool = False) -> Any:
+    """Return a field of `Randomization`; see `Axis`."""
+    axis = {"axis": Axis(takes, named, rebuilds)}
+    if named:
+        return field(default_factory=dict[str, Any], metadata=axis)
+    return field(default=None, metadata=axis)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,6 +118,12 @@ class Randomization:
         gravity: Strength of gravity (m/s²), in the direction that the physics settings say.
             Rebuilds the world at every reset. The robots' own links do not feel it.
         bases: How far robots stand from their placements, by name, each a `Shift`.
+        cameras: How cameras that observe are off their places: the task's own (``"base_camera"``)
+            and those of robots (``"left.hand_camera"``).
+        lights: How the lights ``"side"``, ``"top"`` and ``"ambient"`` differ from their own.
+        colors: What a body, a robot or a link is painted with.
+        textures: Which pattern covers a body; the colour of one that has both is the pattern's.
+        distractors: Bodies that have nothing to do with the task; see `Distractors`.
         action_noise: Added to the action numbers of a robot, or of a joint group, anew at every
             step, in the unit of the numbers.
         action_delay: After how many control steps actions arrive; until the first does, joints
@@ -143,31 +132,25 @@ class Randomization:
             ``"left.qpos"``, ``"*_pose"``. Images, reward and success are spared.
         observation_delay: How many control steps old observations are; until there is one that
             old, the episode's first.
-        cameras: How cameras that observe are off their places: the task's own (``"base_camera"``)
-            and those of robots (``"left.hand_camera"``).
-        lights: How the lights ``"side"``, ``"top"`` and ``"ambient"`` differ from their own.
-        colors: What a body, a robot or a link is painted with.
-        textures: Which pattern covers a body; the colour of one that has both is the pattern's.
-        distractors: Bodies that have nothing to do with the task; see `Distractors`.
     """
 
-    mass: Mapping[str, Distribution] = _by_name()
-    friction: Mapping[str, Distribution] = _by_name()
-    size: Mapping[str, Distribution] = _by_name()
-    stiffness: Mapping[str, Distribution] = _by_name()
-    damping: Mapping[str, Distribution] = _by_name()
-    joint_friction: Mapping[str, Distribution] = _by_name()
-    gravity: Distribution | None = None
-    bases: Mapping[str, Shift] = _by_name()
-    action_noise: Mapping[str, Distribution] = _by_name()
-    action_delay: Distribution | None = None
-    sensor_noise: Mapping[str, Distribution] = _by_name()
-    observation_delay: Distribution | None = None
-    cameras: Mapping[str, CameraShift] = _by_name()
-    lights: Mapping[str, Light] = _by_name()
-    colors: Mapping[str, Surface] = _by_name()
-    textures: Mapping[str, Texture] = _by_name()
-    distractors: Distractors | None = None
+    mass: Mapping[str, Distribution] = _axis(_FACTOR)
+    friction: Mapping[str, Distribution] = _axis(_COEFFICIENT)
+    size: Mapping[str, Distribution] = _axis(_SIZE, rebuilds=True)
+    stiffness: Mapping[str, Distribution] = _axis(_FACTOR)
+    damping: Mapping[str, Distribution] = _axis(_FACTOR)
+    joint_friction: Mapping[str, Distribution] = _axis(_COEFFICIENT)
+    gravity: Distribution | None = _axis(_GRAVITY, named=False, rebuilds=True)
+    bases: Mapping[str, Shift] = _axis(Shift)
+    cameras: Mapping[str, CameraShift] = _axis(CameraShift)
+    lights: Mapping[str, Light] = _axis(Light)
+    colors: Mapping[str, Surface] = _axis(Surface)
+    textures: Mapping[str, Texture] = _axis(Texture)
+    distractors: Distractors | None = _axis(Distractors, named=False)
+    action_noise: Mapping[str, Distribution] = _axis(_NOISE)
+    action_delay: Distribution | None = _axis(_STEPS, named=False)
+    sensor_noise: Mapping[str, Distribution] = _axis(_NOISE)
+    observation_delay: Distribution | None = _axis(_STEPS, named=False)
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense.
@@ -255,7 +238,8 @@ class Randomization:
         return "\n".join(lines) or "nothing varies"
 
 
-assert {field.name for field in fields(Randomization)} == AXES.keys()
+AXES: dict[str, Axis] = {axis.name: axis.metadata["axis"] for axis in fields(Randomization)}
+"""Every axis by its field, in the order in which they are shown."""
 
 
 # -- files: YAML or json, read as plain data; nothing in a file is executed ------------------------

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, pi, sin
-from typing import Any, ClassVar, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -25,14 +25,14 @@ from robots import TaskError
 from robots.descriptor import Vector3
 from tasks.randomization.distributions import Distribution, Stream, Uniform, as_whole
 from tasks.randomization.groups import (
-    ANGLE,
     COLORS,
-    FRACTION,
-    METRES,
     TONES,
+    Angle,
     Declared,
+    Fraction,
     Group,
     Limits,
+    Metres,
     some_of,
 )
 
@@ -92,27 +92,18 @@ class Distractors(Group):
         gap: How far each is from everything else (m).
     """
 
-    count: Declared
+    count: Annotated[Declared, Limits(0, _MOST, "bodies", whole=True)]
     kind: Kind = "dynamic"
     bodies: int | None = None
     shapes: Sequence[str] = SHAPES
-    size: Declared = Uniform(0.015, 0.035)
-    x: Declared = None
-    y: Declared = None
-    yaw: Declared = Uniform(-pi, pi)
-    red: Declared = TONES
-    green: Declared = TONES
-    blue: Declared = TONES
+    size: Annotated[Declared, Limits(1e-3, 1.0, "m")] = Uniform(0.015, 0.035)
+    x: Metres = None
+    y: Metres = None
+    yaw: Angle = Uniform(-pi, pi)
+    red: Fraction = TONES
+    green: Fraction = TONES
+    blue: Fraction = TONES
     gap: float = 0.02
-
-    limits: ClassVar[Mapping[str, Limits]] = {
-        "count": Limits(0, _MOST, "bodies", whole=True),
-        "size": Limits(1e-3, 1.0, "m"),
-        "x": METRES,
-        "y": METRES,
-        "yaw": ANGLE,
-        **dict.fromkeys(COLORS, FRACTION),
-    }
 
     def __post_init__(self) -> None:
         """Refuse what cannot be drawn.

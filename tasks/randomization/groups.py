@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields
-from typing import Any, ClassVar
+from functools import cache
+from typing import Annotated, Any, TypeAlias, get_origin, get_type_hints
 
 from robot_layouts.core.bounds import shown
 from robots import TaskError, UnknownNameError
@@ -57,9 +58,9 @@ class Limits:
         return drawn
 
 
-METRES = Limits(-math.inf, math.inf, "m")
-ANGLE = Limits(-math.inf, math.inf, "rad")
-FRACTION = Limits(0.0, 1.0, "a fraction")
+Metres: TypeAlias = Annotated[Declared, Limits(-math.inf, math.inf, "m")]
+Angle: TypeAlias = Annotated[Declared, Limits(-math.inf, math.inf, "rad")]
+Fraction: TypeAlias = Annotated[Declared, Limits(0.0, 1.0, "a fraction")]
 
 COLORS = ("red", "green", "blue")
 TONES = LogUniform(0.02, 1.0)
@@ -82,12 +83,8 @@ def _remedy(drawn: Distribution) -> str:
 class Group:
     """Several numbers that belong together; a frozen dataclass of distributions.
 
-    Attributes:
-        limits: What each of them may be, by field; one that is None is not varied, and other fields
-            are no numbers that are drawn.
+    Fields that are annotated with `Limits` are drawn, unless they are None.
     """
-
-    limits: ClassVar[Mapping[str, Limits]] = {}
 
     def __post_init__(self) -> None:
         """Refuse what cannot be drawn.
@@ -100,12 +97,12 @@ class Group:
                 raise TaskError(f"{type(self).__name__}: {name} is None; it must be declared")
         for name, given in self.declared.items():
             what = f"{type(self).__name__}: {name}"
-            object.__setattr__(self, name, self.limits[name].read(given, what))
+            object.__setattr__(self, name, _limits(type(self))[name].read(given, what))
 
     @property
     def declared(self) -> dict[str, Distribution]:
         """The distributions of those that are varied, by field."""
-        given = {name: getattr(self, name) for name in self.limits}
+        given = {name: getattr(self, name) for name in _limits(type(self))}
         return {name: value for name, value in given.items() if value is not None}
 
     @classmethod
@@ -151,6 +148,13 @@ class Group:
     def __str__(self) -> str:
         """Show what is varied."""
         return ", ".join(f"{name} {drawn}" for name, drawn in self.declared.items())
+
+
+@cache
+def _limits(group: type[Group]) -> dict[str, Limits]:
+    """Return what each number of a group may be, by field."""
+    hints = get_type_hints(group, include_extras=True).items()
+    return {name: hint.__metadata__[0] for name, hint in hints if get_origin(hint) is Annotated}
 
 
 def some_of(

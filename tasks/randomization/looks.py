@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, TypeAlias
 
-from layouts import Layout
-from robot_layouts.simulation import Camera, Simulation
-from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, camera_name
 from robot_layouts.simulation.scene.looks import (
-    LIGHTS,
     PATTERNS,
     Glow,
     Looks,
@@ -22,19 +18,18 @@ from robot_layouts.simulation.scene.parts import Part
 from robots.descriptor import Vector3
 from tasks.randomization.distributions import Choice, Distribution, Whole
 from tasks.randomization.groups import (
-    ANGLE,
     COLORS,
-    FRACTION,
-    METRES,
     TONES,
+    Angle,
     Declared,
+    Fraction,
     Group,
     Limits,
+    Metres,
     some_of,
 )
-from tasks.randomization.targets import linked_parts
 
-_STRENGTH = Limits(0.0, 100.0, "factor on what is declared")
+_Strength: TypeAlias = Annotated[Declared, Limits(0.0, 100.0, "factor on what is declared")]
 _SEEDS = 10**6
 
 
@@ -52,19 +47,13 @@ class CameraShift(Group):
         fov: Factor on its vertical field of view.
     """
 
-    x: Declared = None
-    y: Declared = None
-    z: Declared = None
-    roll: Declared = None
-    pitch: Declared = None
-    yaw: Declared = None
-    fov: Declared = None
-
-    limits: ClassVar[Mapping[str, Limits]] = {
-        **dict.fromkeys(("x", "y", "z"), METRES),
-        **dict.fromkeys(("roll", "pitch", "yaw"), ANGLE),
-        "fov": Limits(0.01, 10.0, "factor on what is declared"),
-    }
+    x: Metres = None
+    y: Metres = None
+    z: Metres = None
+    roll: Angle = None
+    pitch: Angle = None
+    yaw: Angle = None
+    fov: Annotated[Declared, Limits(0.01, 10.0, "factor on what is declared")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,17 +69,12 @@ class Light(Group):
         blue: Likewise.
     """
 
-    turn: Declared = None
-    tilt: Declared = None
-    strength: Declared = None
-    red: Declared = None
-    green: Declared = None
-    blue: Declared = None
-
-    limits: ClassVar[Mapping[str, Limits]] = {
-        **dict.fromkeys(("turn", "tilt"), ANGLE),
-        **dict.fromkeys(("strength", *COLORS), _STRENGTH),
-    }
+    turn: Angle = None
+    tilt: Angle = None
+    strength: _Strength = None
+    red: _Strength = None
+    green: _Strength = None
+    blue: _Strength = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,17 +92,13 @@ class Surface(Group):
         specular: Strength of highlights.
     """
 
-    red: Declared = None
-    green: Declared = None
-    blue: Declared = None
-    share: Declared = None
-    roughness: Declared = None
-    metallic: Declared = None
-    specular: Declared = None
-
-    limits: ClassVar[Mapping[str, Limits]] = dict.fromkeys(
-        (*COLORS, "share", "roughness", "metallic", "specular"), FRACTION
-    )
+    red: Fraction = None
+    green: Fraction = None
+    blue: Fraction = None
+    share: Fraction = None
+    roughness: Fraction = None
+    metallic: Fraction = None
+    specular: Fraction = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,15 +114,10 @@ class Texture(Group):
     """
 
     kinds: Sequence[str] = PATTERNS
-    cells: Declared = Whole(1, 6)
-    red: Declared = TONES
-    green: Declared = TONES
-    blue: Declared = TONES
-
-    limits: ClassVar[Mapping[str, Limits]] = {
-        "cells": Limits(1, 64, "repeats", whole=True),
-        **dict.fromkeys(COLORS, FRACTION),
-    }
+    cells: Annotated[Declared, Limits(1, 64, "repeats", whole=True)] = Whole(1, 6)
+    red: Fraction = TONES
+    green: Fraction = TONES
+    blue: Fraction = TONES
 
     def __post_init__(self) -> None:
         """Refuse what cannot be drawn.
@@ -175,40 +150,6 @@ class Texture(Group):
     def __str__(self) -> str:
         """Show what is varied."""
         return f"{' or '.join(self.kinds)}, {super().__str__()}"
-
-
-# -- what they can be declared for ---------------------------------------------------------------
-
-
-def look_targets(
-    cameras: Sequence[Camera], painted: Container[str]
-) -> dict[str, Callable[[Simulation], Mapping[str, tuple[Any, ...]]]]:
-    """Return what returns the things that each axis can be declared for, by name.
-
-    Args:
-        cameras: The task's own cameras.
-        painted: Names of bodies whose colour is drawn with something else.
-    """
-    return {
-        "cameras": lambda simulation: _cameras(simulation.layout, cameras),
-        "lights": lambda simulation: {name: (name,) for name in LIGHTS},
-        "colors": lambda simulation: _surfaces(simulation, painted),
-        "textures": lambda simulation: {name: (name,) for name in simulation.worlds[0].bodies},
-    }
-
-
-def _cameras(layout: Layout, cameras: Sequence[Camera]) -> dict[str, tuple[str, ...]]:
-    """Return the names of the cameras that observe: a task's own, and those of its robots."""
-    every: list[AnyCamera] = [*cameras]
-    every += [RobotCamera(n, m) for n, place in layout.items() for m in place.robot.cameras]
-    return {name: (name,) for name in map(camera_name, every)}
-
-
-def _surfaces(simulation: Simulation, painted: Container[str]) -> dict[str, tuple[Part, ...]]:
-    """Return everything that can be painted: bodies, robots, and each of their links."""
-    names = (name for name in simulation.worlds[0].bodies if name not in painted)
-    bodies = {name: (Part(None, name),) for name in names}
-    return {**bodies, **linked_parts(simulation)}
 
 
 # -- what was drawn of them ----------------------------------------------------------------------

@@ -17,26 +17,16 @@ from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.scene.variation import Variation
 from robots.descriptor import Vector3
 from tasks.arrays import leaves
-from tasks.randomization import targets as find
 from tasks.randomization.declaration import AXES, Randomization
 from tasks.randomization.distractors import Rectangle, Scattering
 from tasks.randomization.distributions import Stream
 from tasks.randomization.groups import Group
-from tasks.randomization.looks import look_targets, looks
+from tasks.randomization.looks import looks
 from tasks.randomization.noise import ActionDelay, ActionNoise, Noisy, ObservationDelay, SensorNoise
+from tasks.randomization.targets import offers, targets
 
 DRAWN = "drawn"  # what the names of what was drawn begin with in ``info``
 
-_OFFERED = {  # what there is to vary, by name
-    "mass": find.heavy_parts,
-    "friction": find.rough_parts,
-    "size": find.sized_bodies,
-    "stiffness": find.driven_joints,
-    "damping": find.driven_joints,
-    "joint_friction": find.driven_joints,
-    "bases": find.standing_robots,
-    "action_noise": find.action_numbers,
-}
 _AT_EVERY_STEP = ("action_noise", "sensor_noise")
 
 
@@ -69,10 +59,9 @@ class Randomizer:
         self._declared = declared = randomization.declared
         self._layout = simulation.layout
         own = declared["distractors"].names_of_bodies if "distractors" in declared else ()
-        offers = {**_OFFERED, **look_targets(cameras, own)}
         self._targets = {
-            axis: find.targets(axis, declared[axis], offered(simulation))
-            for axis, offered in offers.items()
+            axis: targets(axis, declared[axis], offered(simulation))
+            for axis, offered in offers(cameras, own).items()
             if axis in declared
         }
         self.rebuilds = any(AXES[axis].rebuilds for axis in declared)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple, TypeVar
 
-from robot_layouts.simulation import Simulation
+from layouts import Layout
+from robot_layouts.simulation import Camera, Simulation
+from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, camera_name
+from robot_layouts.simulation.scene.looks import LIGHTS
 from robot_layouts.simulation.scene.parts import Part
 from robot_layouts.simulation.scene.shapes import SIZED
+from robot_layouts.simulation.world import Body
 from robots import UnknownNameError
 
 Thing = TypeVar("Thing")
@@ -58,40 +62,58 @@ def matching(pattern: str, names: Iterable[str]) -> list[str]:
     return [name for name in names if name.count(".") == dots and fnmatchcase(name, pattern)]
 
 
-def heavy_parts(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
-    """Return what has a mass: dynamic bodies, robots, and each of their links."""
-    bodies = simulation.worlds[0].bodies.values()
-    found = {body.name: (Part(None, body.name),) for body in bodies if body.kind == "dynamic"}
-    return {**found, **linked_parts(simulation)}
+def offers(
+    cameras: Sequence[Camera], painted: Container[str]
+) -> dict[str, Callable[[Simulation], dict[str, tuple[Any, ...]]]]:
+    """Return, for each axis that takes names, what returns the things that there are, by name.
+
+    Args:
+        cameras: The task's own cameras.
+        painted: Names of bodies whose colour is drawn with something else.
+    """
+    return {
+        "mass": lambda simulation: _parts(simulation, lambda body: body.kind == "dynamic"),
+        "friction": lambda simulation: _parts(
+            simulation, lambda body: any(shape.collides for shape in body.shapes)
+        ),
+        "size": _sized_bodies,
+        "stiffness": _driven_joints,
+        "damping": _driven_joints,
+        "joint_friction": _driven_joints,
+        "bases": lambda simulation: _by_name(simulation.layout),
+        "action_noise": _action_numbers,
+        "cameras": lambda simulation: _cameras(simulation.layout, cameras),
+        "lights": lambda simulation: _by_name(LIGHTS),
+        "colors": lambda simulation: _parts(simulation, lambda body: body.name not in painted),
+        "textures": lambda simulation: _by_name(simulation.worlds[0].bodies),
+    }
 
 
-def linked_parts(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
-    """Return the links of each robot, and each of them by itself."""
+def _by_name(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    return {name: (name,) for name in names}
+
+
+def _parts(simulation: Simulation, takes: Callable[[Body], bool]) -> dict[str, tuple[Part, ...]]:
+    """Return some bodies, the links of each robot, and each of these by itself."""
+    bodies = [body.name for body in simulation.worlds[0].bodies.values() if takes(body)]
     links = {
         robot: tuple(Part(robot, link) for link in simulation.index.robots[robot].links)
         for robot in simulation.layout
     }
     single = {str(part): (part,) for parts in links.values() for part in parts}
-    return {**links, **single}
+    return {**{name: (Part(None, name),) for name in bodies}, **links, **single}
 
 
-def rough_parts(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
-    """Return what has a friction: bodies that touch others, robots, and each of their links."""
-    bodies = simulation.worlds[0].bodies.values()
-    touching = [body.name for body in bodies if any(shape.collides for shape in body.shapes)]
-    return {**{name: (Part(None, name),) for name in touching}, **linked_parts(simulation)}
-
-
-def sized_bodies(simulation: Simulation) -> dict[str, tuple[str, ...]]:
+def _sized_bodies(simulation: Simulation) -> dict[str, tuple[str, ...]]:
     """Return the bodies that have a size, and are no furniture that every reset puts back."""
-    return {
-        body.name: (body.name,)
+    return _by_name(
+        body.name
         for body in simulation.worlds[0].bodies.values()
         if not body.anchored and all(isinstance(shape, SIZED) for shape in body.shapes)
-    }
+    )
 
 
-def driven_joints(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
+def _driven_joints(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
     """Return what has drives: robots, their joint groups, and joints."""
     joints: dict[str, tuple[Part, ...]] = {}
     for robot, placement in simulation.layout.items():
@@ -104,12 +126,7 @@ def driven_joints(simulation: Simulation) -> dict[str, tuple[Part, ...]]:
     return joints
 
 
-def standing_robots(simulation: Simulation) -> dict[str, tuple[str, ...]]:
-    """Return the robots."""
-    return {robot: (robot,) for robot in simulation.layout}
-
-
-def action_numbers(simulation: Simulation) -> dict[str, tuple[int, ...]]:
+def _action_numbers(simulation: Simulation) -> dict[str, tuple[int, ...]]:
     """Return the action numbers of robots and of their joint groups."""
     numbers: dict[str, tuple[int, ...]] = {}
     first = 0
@@ -120,3 +137,10 @@ def action_numbers(simulation: Simulation) -> dict[str, tuple[int, ...]]:
             first += group.size
         numbers[robot] = tuple(range(begin, first))
     return {name: own for name, own in numbers.items() if own}
+
+
+def _cameras(layout: Layout, cameras: Sequence[Camera]) -> dict[str, tuple[str, ...]]:
+    """Return the names of the cameras that observe: a task's own, and those of its robots."""
+    every: list[AnyCamera] = [*cameras]
+    every += [RobotCamera(n, m) for n, place in layout.items() for m in place.robot.cameras]
+    return _by_name(map(camera_name, every))

@@ -138,7 +138,7 @@ def interrupted(moment, event, matches, call):
 @pytest.mark.long
 def test_a_vector_is_of_use_after_an_interrupt_at_any_instruction_of_a_conversation():
     def talks(code):
-        return code.co_filename.endswith(("fronts/workers.py", "processes/worker.py"))
+        return code.co_filename.endswith(("interfaces/workers.py", "processes/worker.py"))
 
     with closing(VectorTask("PushCube-v1", num_envs=2, num_workers=2, timeout=5.0)) as env:
         action = np.full((2, 8), 0.2, np.float32)
@@ -154,7 +154,7 @@ def test_a_vector_is_of_use_after_an_interrupt_at_any_instruction_of_a_conversat
 
 def test_an_interrupt_as_a_call_begins_locks_nobody_out():
     def begins(code):
-        return code.co_filename.endswith("fronts/vector.py") and code.co_name == "call"
+        return code.co_filename.endswith("interfaces/vector.py") and code.co_name == "call"
 
     with closing(VectorTask("PushCube-v1", num_envs=1, num_workers=0)) as env:
         for moment in (1, 2, 3):
