@@ -39,7 +39,7 @@ from robots import DescriptorError, SimulationError, TaskError
 from robots.portable import numpy_versions
 from tasks import TaskEnv, list_tasks, make
 from tasks.episode import REBUILT
-from tasks.varying.streams import Stream
+from tasks.randomization.distributions import Stream
 
 PACKAGES = ("numpy", "torch", "sapien")
 EXPERT = "expert"

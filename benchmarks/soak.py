@@ -26,7 +26,7 @@ from tqdm import tqdm
 
 from robots import TaskError
 from tasks import get_task_class, list_tasks
-from tasks.fronts.vector import VectorTask
+from tasks.interfaces.vector import VectorTask
 
 WORKER_ROUNDS, OWN_ROUNDS = 15, 6  # in workers; in this process, in each lap
 WARM_UP = 3  # rebuilds of all environments in workers, until the heap has its holes

@@ -32,7 +32,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from robot_layouts.core.module_names import missing_name
-from tasks.fronts import lerobot_vec_env, parallel_env, register, sb3_vec_env
+from tasks.interfaces import lerobot_vec_env, parallel_env, register, sb3_vec_env
 from tasks.registry import get_task_class, list_clones, list_tasks, make, on_registration
 
 if TYPE_CHECKING:

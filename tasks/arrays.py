@@ -1,7 +1,8 @@
-"""Arrays out of what users give for them."""
+"""Arrays out of what users give for them, and mappings of arrays, which may be nested."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -26,3 +27,24 @@ def array_of(value: Any, what: str, error: type[RobotLayoutsError]) -> NDArray[A
         return np.asarray(value)
     except (TypeError, ValueError, RuntimeError) as problem:  # sparse, quantized, meta, ragged
         raise error(f"{what} is not an array of numbers: {problem}") from None
+
+
+def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield what a nested mapping holds, by the path to it: ``"extra/tcp_pose"``.
+
+    Args:
+        tree: The mapping, or what one holds.
+        name: What paths begin with.
+    """
+    if isinstance(tree, Mapping):
+        for key, part in tree.items():
+            yield from leaves(part, f"{name}/{key}" if name else f"{key}")
+    else:
+        yield name, tree
+
+
+def row_of(tree: Any, row: int) -> Any:
+    """Return one row of each array of a nested mapping, or of a single array."""
+    if isinstance(tree, Mapping):
+        return {key: row_of(part, row) for key, part in tree.items()}
+    return tree[row]

@@ -12,7 +12,7 @@ from robot_layouts.core.commands import notice
 from robots import RobotDescriptor, TaskError
 from robots.named import FORMS, is_path, named_robot
 from tasks.language.needs import ACT, HOLD
-from tasks.varying.randomization import Randomization
+from tasks.randomization.declaration import Randomization
 
 PlacedRobot = Annotated[str, Word("PLACE=ROBOT", about=FORMS)]
 

@@ -13,6 +13,7 @@ from functools import partial
 from keyword import iskeyword
 from math import cos, pi, sin
 from pathlib import Path
+from string import Template
 from typing import NamedTuple
 
 import numpy as np
@@ -37,100 +38,7 @@ RADIUS = 0.03  # of a goal (m)
 # middle is from where the TCP begins, besides the radius: no goal holds it from the start.
 SPREAD, ASIDE = 0.05, 0.1
 
-_TASK = '''"""{title}: every arm brings its tool centre point to a ball in the air."""
-
-{paths}from robot_layouts.experts import register_expert
-from robot_layouts.experts.reaching import reaching
-from robot_layouts.experts.rehearsal import first_success
-{imports}
-from tasks.maths import norm
-
-RADIUS = {radius}  # of a goal (m)
-
-
-@register_task("{task_id}")
-class {title}(MultiRobotTask):
-    """Bring every TCP to its goal. Success: all are within 3 cm of theirs."""
-
-    layout = {layout}
-    max_episode_steps = 100
-    max_reward = 2
-{table}
-    # where each goal may be (m)
-{goals}
-
-    def evaluate(self, state):
-        """Success: every TCP is in its goal."""
-        arrived = state.full(True)
-        for place in self.layout.places:
-            arrived = arrived & (state.tcp_distance(place, f"goal_{{place}}") <= RADIUS)
-        return {{"success": arrived}}
-
-    def observe(self, state, info):
-        """The way of every TCP to its goal; joints are observed anyway."""
-        return {{f"{{place}}_way": self.way(state, place) for place in self.layout.places}}
-
-    def dense_reward(self, state, action, info):
-        """Nearness of all TCPs (1); 2 on success."""
-        near = closeness(*(norm(self.way(state, place)) for place in self.layout.places))
-        return sum(near) / len(near) + info["success"]
-
-    def way(self, state, place):
-        """From a TCP to its goal, (N, 3) (m)."""
-        return state.tcp_offset(place, f"goal_{{place}}")
-
-
-def reach(task, seed):
-    """The expert: actions (T, A) that solve the episode of a seed, found in a world of its own."""
-    places = task.layout.places
-    # Grippers stay as they are: jaws that swing would move the TCP.
-    script = {{
-        place: [reaching(task, place, "goal", goal_of(place), gripper=0.0)] for place in places
-    }}
-    return first_success(task, seed, lambda scene: [script])
-
-
-def goal_of(place):
-    """Return what finds the goal of a place in a scene, (3,) (m)."""
-    return lambda scene: scene.body(f"goal_{{place}}")[0]
-
-
-register_expert("{task_id}", reach)
-'''
-
-_TEST = '''"""Tests of {task_id}; run them with pytest, in this folder."""
-
-import numpy as np
-
-import tasks
-from robot_layouts.experts import find_expert
-from tasks.episode import play
-
-TASK = "{module}:{task_id}"
-
-
-def test_the_expert_solves_it():
-    env = tasks.make(TASK)
-    expert = find_expert(TASK)
-    for seed in range(3):
-        assert play(env, seed, expert(env, seed)).solved
-
-
-def test_a_seed_is_an_episode():
-    env = tasks.make(TASK, num_envs=2)
-    first, _ = env.reset(seed=[7, 8])
-    again, _ = env.reset(seed=[8, 7])
-    assert np.array_equal(first[0], again[1])
-    assert not np.array_equal(first[0], first[1])
-
-
-def test_rewards_stay_below_their_largest():
-    env = tasks.make(TASK, num_envs=4, reward_mode="normalized_dense")
-    env.reset(seed=0)
-    for _ in range(5):
-        reward = env.step(env.action_space.sample())[1]
-        assert ((reward >= 0) & (reward <= 1)).all()
-'''
+TEMPLATES = Path(__file__).with_name("templates")
 
 
 def new_task(
@@ -152,7 +60,7 @@ def new_task(
     module, task_id = _names(name)
     texts = {
         f"{module}.py": task_source(task_id, _robots(robots), out),
-        f"test_{module}.py": _TEST.format(module=module, task_id=task_id),
+        f"test_{module}.py": _filled("test_task", module=module, task_id=task_id),
     }
     for path in write_new(out, texts):
         print(path)
@@ -188,7 +96,8 @@ def task_source(task_id: str, robots: Mapping[str, str], folder: Path) -> str:
         f"from layouts import {preset.name}",
         f"from tasks import {', '.join([*words, 'register_task'])}",
     ]
-    return _TASK.format(
+    return _filled(
+        "task",
         paths="from pathlib import Path\n\n" if paths else "",
         title=task_id.rpartition("-")[0],
         radius=RADIUS,
@@ -198,6 +107,11 @@ def task_source(task_id: str, robots: Mapping[str, str], folder: Path) -> str:
         table="    table = WideTable()\n" if wide else "",
         goals="\n".join(_goal(place, layout) for place in layout.places),
     )
+
+
+def _filled(template: str, **words: object) -> str:
+    """Return the text of a template of this folder, with words in it."""
+    return Template((TEMPLATES / f"{template}.py.txt").read_text("utf-8")).substitute(words)
 
 
 def _goal(place: str, layout: Layout) -> str:

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from tasks.engine.env import MultiRobotTask, TaskEnv
-    from tasks.engine.making import ScenarioFields
-    from tasks.engine.scenario import Scenario
+    from tasks.engine.scenario import MakingFields, Scenario, ScenarioFields
 
 CLONES = "tasks.maniskill."  # where the tasks that clone one of ManiSkill's are
 
@@ -231,17 +230,20 @@ def make(
         AssetError: If robot files cannot be found.
     """
     cls = get_task_class(task_id)
-    return cls(make_scenario(cls, num_envs, robots, layout, obs_mode, reward_mode, **fields))
+    scenario = make_scenario(
+        cls,
+        num_envs,
+        robots=robots,
+        layout=layout,
+        obs_mode=obs_mode,
+        reward_mode=reward_mode,
+        **fields,
+    )
+    return cls(scenario)
 
 
 def make_scenario(
-    cls: type[MultiRobotTask],
-    num_envs: int = 1,
-    robots: RobotLike | Mapping[str, RobotLike] | None = None,
-    layout: Layout | None = None,
-    obs_mode: str = "state",
-    reward_mode: str | None = None,
-    **fields: Unpack[ScenarioFields],
+    cls: type[MultiRobotTask], num_envs: int = 1, **making: Unpack[MakingFields]
 ) -> Scenario:
     """Return the scenario that `make` makes a task of, for the same arguments.
 
@@ -252,17 +254,18 @@ def make_scenario(
     """
     scenario = cls.scenario
     known = [*(field.name for field in fields_of(scenario)), "robots"]
-    for name in fields:
+    for name in making:
         if name not in known:
             raise UnexpectedArgumentError.of(cls.task_id, name, known)
+    layout, robots = making.pop("layout", None), making.pop("robots", None)
     if layout is not None:
         if not isinstance(layout, Layout):
             raise TaskError(f"layout is {shown(layout)}; a layouts.Layout is needed")
         scenario.layout = layout
     if robots is not None:
         scenario.layout = _replace_robots(scenario.layout, robots)
-    chosen = {"num_envs": num_envs, "obs_mode": obs_mode, "reward_mode": reward_mode, **fields}
-    for name, value in chosen.items():
+    scenario.num_envs = num_envs
+    for name, value in making.items():
         setattr(scenario, name, value)
     return scenario
 

@@ -2,6 +2,8 @@
 
 Functions of arrays are in `tasks.maths`, presets of layouts in `layouts`.
 """
+# ruff: noqa: F401
+# pyright: reportUnusedImport=false
 
 from robot_layouts.simulation import (
     Box,
@@ -37,7 +39,6 @@ from tasks.language.bodies import (
     WideTable,
 )
 from tasks.language.needs import Needs
-from tasks.language.poses import angle_between, compose, inverse, transform
 from tasks.language.props import (
     BLUE,
     DARK_BLUE,
@@ -52,86 +53,21 @@ from tasks.language.props import (
     add_wide_table,
 )
 from tasks.language.randomness import EpisodeRandom
-from tasks.language.shaping import closeness, letting_go, stillness
-from tasks.language.stacking import diagonal, distance_to_top, is_at_rest, lies_on
+from tasks.language.terms import (
+    angle_between,
+    closeness,
+    compose,
+    diagonal,
+    distance_to_top,
+    inverse,
+    is_at_rest,
+    letting_go,
+    lies_on,
+    stillness,
+    transform,
+)
+from tasks.randomization.declaration import Randomization, Shift
+from tasks.randomization.distractors import Distractors
+from tasks.randomization.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
+from tasks.randomization.looks import CameraShift, Light, Surface, Texture
 from tasks.registry import register_task
-from tasks.varying.axes import Shift
-from tasks.varying.distractors import Distractors
-from tasks.varying.distributions import Choice, Fixed, LogUniform, Normal, Uniform, Whole
-from tasks.varying.looks import CameraShift, Light, Surface, Texture
-from tasks.varying.randomization import Randomization
-
-__all__ = [
-    "Area",
-    "BLUE",
-    "Ball",
-    "Box",
-    "Camera",
-    "CameraShift",
-    "Capsule",
-    "Choice",
-    "Color",
-    "Compound",
-    "Cube",
-    "Cuboid",
-    "Cylinder",
-    "DARK_BLUE",
-    "DARK_RED",
-    "Distractors",
-    "EpisodeRandom",
-    "FACE_UP",
-    "Finish",
-    "Fixed",
-    "Friction",
-    "GREEN",
-    "Goal",
-    "Info",
-    "Light",
-    "LogUniform",
-    "Mesh",
-    "MultiRobotTask",
-    "TaskEnv",
-    "Needs",
-    "Normal",
-    "POLISHED",
-    "Peg",
-    "PhysicsSettings",
-    "Plane",
-    "Quaternion",
-    "RED",
-    "Randomization",
-    "Scenario",
-    "Shape",
-    "Shift",
-    "Sphere",
-    "State",
-    "Surface",
-    "TARGET_HEIGHT",
-    "Table",
-    "Target",
-    "Texture",
-    "Vector3",
-    "Uniform",
-    "WHITE",
-    "Whole",
-    "WideTable",
-    "World",
-    "add_goal",
-    "add_table",
-    "add_target",
-    "add_wide_table",
-    "angle_between",
-    "closeness",
-    "compose",
-    "diagonal",
-    "distance_to_top",
-    "inverse",
-    "is_at_rest",
-    "letting_go",
-    "lies_on",
-    "linear",
-    "once_per_state",
-    "register_task",
-    "stillness",
-    "transform",
-]

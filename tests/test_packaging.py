@@ -155,8 +155,8 @@ LOADED_WITH_ITS_EXTRA = {
     "robot_layouts/data/export/lerobot.py",
     "robot_layouts/data/export/lerobot_files.py",
     "robot_layouts/data/export/lerobot_pictures.py",
-    "tasks/fronts/parallel.py",
-    "tasks/fronts/sb3.py",
+    "tasks/interfaces/parallel.py",
+    "tasks/interfaces/sb3.py",
 }
 
 

@@ -25,6 +25,7 @@ from layouts.validation.findings import (
 from robot_layouts.core.figures import COLOURS, FAINT, INK, blank_figure, save_figure
 from robot_layouts.core.quoting import cut
 from robot_layouts.kinematics.rotations import Floats
+from robots import LayoutError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -28,7 +28,7 @@ from tasks.registry import make_scenario
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from tasks.engine.making import MakingFields
+    from tasks.engine.scenario import MakingFields
 
 
 @dataclass(frozen=True)

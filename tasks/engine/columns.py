@@ -11,7 +11,7 @@ from layouts import Layout
 from robot_layouts.simulation import Simulation, State, World
 from robot_layouts.simulation.maths import Floats, all_finite
 from robots.descriptor import Vector3
-from tasks.engine.finite import NotFinite
+from tasks.engine.divergence import NotFinite
 
 LEROBOT, FILMED, ROBOMIMIC = COLUMN_MODES = ("lerobot", "lerobot+video", "robomimic")
 OVERVIEW = "overview"  # the camera that shows all robots to people

@@ -22,7 +22,7 @@ from robot_layouts.simulation import Camera, PhysicsSettings
 from robots import TaskError
 from tasks.engine.task import DENSE_MODES, Task
 from tasks.language.bodies import Body, Table, WideTable
-from tasks.varying.randomization import Randomization
+from tasks.randomization.declaration import Randomization
 
 HOOKS = {
     "design": ("rng",),
@@ -45,6 +45,53 @@ _STEPPING = ("__init__", "__new__", "reset", "step", "advance", "render", "close
 _ALIKE = 0.85  # of two names, 1 being the same; below it one is hardly meant for the other
 _STEPS = 2**31 - 1
 
+_NEEDED: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "layout": (
+        lambda given: isinstance(given, Layout),
+        "a layouts.Layout is needed, such as layouts.single({'arm': 'panda'})",
+    ),
+    "robot_counts": (
+        lambda given: given is None or (isinstance(given, range) and bool(given)),
+        "a range of 1 or more numbers is needed, such as range(2, 5) for two to four robots",
+    ),
+    "reward_modes": (
+        lambda given: _is_row(given, str) and bool(given) and {*given} <= {*DENSE_MODES},
+        f"a tuple of {', '.join(DENSE_MODES)} is needed, the default first",
+    ),
+    "physics": (
+        lambda given: isinstance(given, PhysicsSettings | None),
+        "tasks.PhysicsSettings or None is needed",
+    ),
+    "randomization": (
+        lambda given: isinstance(given, Randomization | None),
+        "a tasks.Randomization or None is needed",
+    ),
+    "sensed": (
+        lambda given: _is_row(given, str),
+        "a tuple of names is needed, such as ('*tcp_pose',) with its comma",
+    ),
+    "instruction": (lambda given: isinstance(given, str), "a sentence is needed"),
+    "cameras": (
+        lambda given: _is_row(given, Camera, list),
+        "a tuple of tasks.Camera is needed, such as (Camera((0.3, 0, 0.6), (0, 0, 0.1)),) with its"
+        " comma",
+    ),
+    "viewpoint": (
+        lambda given: _is_row(given, object, list) and len(given) == 2,
+        "the camera's position and target are needed (m)",
+    ),
+    "table": (
+        lambda given: isinstance(given, Table | WideTable),
+        "a tasks.Table or tasks.WideTable is needed, and other bodies go by other names",
+    ),
+}
+"""What an attribute must be: whether it is, and in words."""
+
+
+def _is_row(given: Any, kind: type, *more: type) -> bool:
+    """Return whether something is a tuple, or what else may be, of things of one kind."""
+    return isinstance(given, (tuple, *more)) and all(isinstance(x, kind) for x in given)
+
 
 @lru_cache(maxsize=1024)
 def check_declaration(cls: type[Task]) -> None:
@@ -59,14 +106,17 @@ def check_declaration(cls: type[Task]) -> None:
     Warns:
         UserWarning: If it defines what nothing calls, under nearly the name of what is called.
     """
-    task = cls.__name__
-    _check_layout(cls)
-    if "max_episode_steps" not in _known(cls):
+    task, known = cls.__name__, {name for base in cls.__mro__ for name in vars(base)}
+    if "layout" not in known:
+        raise TaskError(
+            f"{task} sets no layout: which robots stand where, such as"
+            f" layout = layouts.single({{'arm': 'panda'}}){_meant(cls, 'layout')}"
+        )
+    if "max_episode_steps" not in known:
         raise TaskError(
             f"{task} sets no max_episode_steps: after how many control steps an episode is"
             f" truncated, such as max_episode_steps = 100{_meant(cls, 'max_episode_steps')}"
         )
-    checked_whole(f"{task}.max_episode_steps", cls.max_episode_steps, 1, _STEPS, TaskError)
     if cls.evaluate is Task.evaluate:
         raise TaskError(
             f"{task} does not define evaluate(self, state), which says where it is solved:"
@@ -74,41 +124,17 @@ def check_declaration(cls: type[Task]) -> None:
         )
     for name, arguments in HOOKS.items():
         _check_hook(cls, name, arguments)
-    _check_rewards(cls)
-    _check_numbers(cls)
-    _check_views(cls)
+    _check_attributes(cls)
     _check_bodies(cls)
-    _check_methods(cls)
+    for name, value in _own(cls):
+        if name in _STEPPING and isinstance(value, FunctionType):
+            raise TaskError(
+                f"{task} defines {name}, which nothing calls: tasks are stepped by tasks.TaskEnv,"
+                f" and define {', '.join(HOOKS)}"
+            )
     for name, hook in _nearly_hooks(cls):
         warnings.warn(
             f"{task} defines {name!r}, which nothing calls. Did you mean {hook!r}?", stacklevel=3
-        )
-
-
-def _check_layout(cls: type[Task]) -> None:
-    task = cls.__name__
-    if "layout" not in _known(cls):
-        raise TaskError(
-            f"{task} sets no layout: which robots stand where, such as"
-            f" layout = layouts.single({{'arm': 'panda'}}){_meant(cls, 'layout')}"
-        )
-    layout, counts = cls.layout, cls.robot_counts
-    if not isinstance(layout, Layout):
-        raise TaskError(
-            f"{task}.layout is {shown(layout)}; a layouts.Layout is needed, such as"
-            " layouts.single({'arm': 'panda'})"
-        )
-    if counts is None:
-        return
-    if not isinstance(counts, range) or not counts:
-        raise TaskError(
-            f"{task}.robot_counts is {shown(counts)}; a range of 1 or more numbers is needed, such"
-            " as range(2, 5) for two to four robots"
-        )
-    if len(layout.arms) not in counts:
-        raise TaskError(
-            f"{task}.layout has {len(layout.arms)} robots, which are not in its robot_counts,"
-            f" {counts}"
         )
 
 
@@ -133,70 +159,33 @@ def _check_hook(cls: type[Task], name: str, arguments: tuple[str, ...]) -> None:
         raise TaskError(f"{task}.{name} must return its result; it has async or yield")
 
 
-def _check_rewards(cls: type[Task]) -> None:
-    task, modes = cls.__name__, cls.reward_modes
-    known = isinstance(modes, tuple) and all(mode in DENSE_MODES for mode in modes)
-    if not known or not modes:
-        raise TaskError(
-            f"{task}.reward_modes is {shown(modes)}; a tuple of {', '.join(DENSE_MODES)} is needed,"
-            " the default first"
-        )
-    if cls.dense_reward is Task.dense_reward and {"dense", "normalized_dense"} & {*modes}:
-        raise TaskError(
-            f"{task}.reward_modes has {modes[0]!r}, but it does not define dense_reward(self,"
-            f" state, action, info){_meant(cls, 'dense_reward')}"
-        )
-    checked_number(f"{task}.max_reward", cls.max_reward, 1e-6, 1e6, TaskError)
-
-
-def _check_numbers(cls: type[Task]) -> None:
+def _check_attributes(cls: type[Task]) -> None:
     task = cls.__name__
+    for name, (fits, needed) in _NEEDED.items():
+        if not fits(given := getattr(cls, name)):
+            raise TaskError(f"{task}.{name} is {shown(given)}; {needed}")
+    if cls.robot_counts is not None and len(cls.layout.arms) not in cls.robot_counts:
+        raise TaskError(
+            f"{task}.layout has {len(cls.layout.arms)} robots, which are not in its robot_counts,"
+            f" {cls.robot_counts}"
+        )
+    if cls.dense_reward is Task.dense_reward and {"dense", "normalized_dense"} & {
+        *cls.reward_modes
+    }:
+        raise TaskError(
+            f"{task}.reward_modes has {cls.reward_modes[0]!r}, but it does not define"
+            f" dense_reward(self, state, action, info){_meant(cls, 'dense_reward')}"
+        )
+    checked_whole(f"{task}.max_episode_steps", cls.max_episode_steps, 1, _STEPS, TaskError)
+    checked_number(f"{task}.max_reward", cls.max_reward, 1e-6, 1e6, TaskError)
     checked_whole(f"{task}.first_seed", cls.first_seed, 0, 2**32 - 1, TaskError)
     checked_flag(f"{task}.rebuilds", cls.rebuilds, TaskError)
-    if not (cls.physics is None or isinstance(cls.physics, PhysicsSettings)):
-        raise TaskError(
-            f"{task}.physics is {shown(cls.physics)}; tasks.PhysicsSettings or None is needed"
-        )
-    if not (cls.randomization is None or isinstance(cls.randomization, Randomization)):
-        raise TaskError(
-            f"{task}.randomization is {shown(cls.randomization)}; a tasks.Randomization or None is"
-            " needed"
-        )
-    sensed = cls.sensed
-    if not isinstance(sensed, tuple) or not all(isinstance(x, str) for x in sensed):
-        raise TaskError(
-            f"{task}.sensed is {shown(sensed)}; a tuple of names is needed, such as"
-            " ('*tcp_pose',) with its comma"
-        )
-
-
-def _check_views(cls: type[Task]) -> None:
-    task = cls.__name__
-    if not isinstance(cls.instruction, str):
-        raise TaskError(f"{task}.instruction is {shown(cls.instruction)}; a sentence is needed")
-    if not isinstance(cls.cameras, (tuple, list)) or not all(
-        isinstance(camera, Camera) for camera in cls.cameras
-    ):
-        raise TaskError(
-            f"{task}.cameras is {shown(cls.cameras)}; a tuple of tasks.Camera is needed, such as"
-            " (Camera((0.3, 0, 0.6), (0, 0, 0.1)),) with its comma"
-        )
-    if not isinstance(cls.viewpoint, (tuple, list)) or len(cls.viewpoint) != 2:
-        raise TaskError(
-            f"{task}.viewpoint is {shown(cls.viewpoint)}; the camera's position and target are"
-            " needed (m)"
-        )
     for what, point in zip(("position", "target"), cls.viewpoint, strict=True):
         checked_numbers(f"{task}.viewpoint's {what}", point, 3, 1e6, TaskError, "m")
 
 
 def _check_bodies(cls: type[Task]) -> None:
     task = cls.__name__
-    if not isinstance(cls.table, (Table, WideTable)):
-        raise TaskError(
-            f"{task}.table is {shown(cls.table)}; a tasks.Table or tasks.WideTable is needed, and"
-            " other bodies go by other names"
-        )
     for base in reversed(cls.__mro__):
         for name, value in vars(base).items():
             if isinstance(value, type) and issubclass(value, (Body, Table, WideTable)):
@@ -210,20 +199,6 @@ def _check_bodies(cls: type[Task]) -> None:
                 f"{task}.{name} is a body, but {name!r} is a name that every task has for something"
                 " else; call it something else"
             )
-
-
-def _check_methods(cls: type[Task]) -> None:
-    """Refuse what only what steps a task could call."""
-    for name, value in _own(cls):
-        if name in _STEPPING and isinstance(value, FunctionType):
-            raise TaskError(
-                f"{cls.__name__} defines {name}, which nothing calls: tasks are stepped by"
-                f" tasks.TaskEnv, and define {', '.join(HOOKS)}"
-            )
-
-
-def _known(cls: type) -> set[str]:
-    return {name for base in cls.__mro__ for name in vars(base)}
 
 
 def _own(cls: type) -> Iterator[tuple[str, Any]]:

@@ -12,34 +12,39 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from torch import Tensor
 
-from layouts import Layout
 from robot_layouts.simulation import Simulation, State, World
 from robot_layouts.simulation.maths import Floats, all_finite
 from robots import SimulationError, TaskError
 from tasks.engine.actions import ActionReader
-from tasks.engine.arguments import (
+from tasks.engine.checks import (
     ELAPSED,
+    ReturnedArrays,
+    ReturnedReward,
     check_info,
     checked_ids,
     checked_seeds,
+    expect_nothing,
+    unchanged,
     wants_rebuild,
 )
-from tasks.engine.bystanders import check_needs, check_places, settled
 from tasks.engine.declared import check_declaration
 from tasks.engine.display import task_html, task_text
-from tasks.engine.finite import NotFinite, refuse_observation, refuse_reward, refuse_state
-from tasks.engine.layout_check import is_tested, refuse_collisions
-from tasks.engine.memory import Memory
+from tasks.engine.divergence import (
+    NotFinite,
+    SpeedWatch,
+    refuse_observation,
+    refuse_reward,
+    refuse_state,
+)
 from tasks.engine.observation import Observer, read_mode, space_of
+from tasks.engine.places import built_layout, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
-from tasks.engine.returned import ReturnedArrays, ReturnedReward, expect_nothing, unchanged
 from tasks.engine.scenario import Scenario
-from tasks.engine.speeds import SpeedWatch
-from tasks.engine.task import Info, Task
+from tasks.engine.task import Info, Memory, Task
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
-from tasks.varying.distractors import add_distractors, area_of
-from tasks.varying.varying import Varying
+from tasks.randomization.distractors import add_distractors, area_of
+from tasks.randomization.randomizer import Randomizer
 
 
 class _FreshScenario:
@@ -146,8 +151,8 @@ class TaskEnv(Remade):
         task.moving = self._everywhere
         task.memory = Memory()
         self._expect_returns(task_class.__name__)
-        self._varying: Varying | None = None
-        vars(task).update(_rngs=self._rngs, _elapsed=self._elapsed, _varying=None)
+        self._randomizer: Randomizer | None = None
+        vars(task).update(_rngs=self._rngs, _elapsed=self._elapsed, _randomizer=None)
         self._simulation: Simulation | None = Simulation(
             self.layout,
             self._build_world,
@@ -161,15 +166,15 @@ class TaskEnv(Remade):
         task.simulation = self._simulation
         self._speeds = SpeedWatch(self._simulation)
         if scenario.randomization:
-            self._varying = Varying(
+            self._randomizer = Randomizer(
                 scenario.randomization,
                 self._simulation,
                 scenario.cameras or task.cameras,
                 area_of(task.table.outline(layout), task.viewpoint[1]),
             )
-            vars(task)["_varying"] = self._varying
+            vars(task)["_randomizer"] = self._randomizer
             self._draw(self._everywhere)
-            if self._varying.rebuilds:
+            if self._randomizer.rebuilds:
                 self._simulation.rebuild(self._everywhere, self._build_again)
         self._camera: Any = None
         self._responds = task_class.respond is not Task.respond
@@ -266,7 +271,7 @@ class TaskEnv(Remade):
             if reconfigure:
                 self._rngs[i].reseed_for_rebuild()
         self._draw(ids)
-        again = self._varying is not None and self._varying.rebuilds
+        again = self._randomizer is not None and self._randomizer.rebuilds
         if reconfigure:
             self.simulation.rebuild(ids, self._build_world)
             self.state_was_set &= len(ids) < self.num_envs
@@ -312,11 +317,11 @@ class TaskEnv(Remade):
         moving = self.task.moving = self._everywhere if ids is None else ids
         if self._begins_steps:
             self.task.begin_step()
-        if self._varying is None:
+        if self._randomizer is None:
             simulation.step(flat, self._state.joint_positions, ids)
         else:
             before = self._state.joint_positions
-            self._varying.step(simulation, flat, before, moving, self._elapsed)
+            self._randomizer.step(simulation, flat, before, moving, self._elapsed)
         if ids is None:
             self._elapsed += _ONE
         else:
@@ -403,16 +408,16 @@ class TaskEnv(Remade):
     def _build_world(self, world: World, index: int) -> None:
         rng = self._rngs[index]
         world.design = self.task.design(rng)
-        if self._varying is not None:
-            self._varying.describe(world, index)
+        if self._randomizer is not None:
+            self._randomizer.describe(world, index)
         self._fill(world)
         rng.restart_numpy()
 
     def _build_again(self, world: World, index: int) -> None:
         """Build the same world with what varies, which leaves the task's draws as they are."""
-        assert self._varying is not None
+        assert self._randomizer is not None
         world.design = self.simulation.worlds[index].design
-        self._varying.describe(world, index)
+        self._randomizer.describe(world, index)
         self._fill(world)
 
     def _fill(self, world: World) -> None:
@@ -422,15 +427,15 @@ class TaskEnv(Remade):
 
     def _draw(self, ids: Iterable[int]) -> None:
         """Draw what varies in the coming episodes."""
-        if self._varying is not None:
+        if self._randomizer is not None:
             for i in ids:
-                self._varying.begin(i, self._rngs[i].stream)
+                self._randomizer.begin(i, self._rngs[i].stream)
 
     def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
         task = self.task
         self.simulation.clear(ids)
-        if self._varying is not None:
-            self._varying.apply(self.simulation, ids)
+        if self._randomizer is not None:
+            self._randomizer.apply(self.simulation, ids)
         for i in ids:  # all that is placed here reaches the simulator in one go
             world = self.simulation.worlds[i]
             expect_nothing(task, "reset_robots", task.reset_robots(world, self._rngs[i]))
@@ -440,19 +445,19 @@ class TaskEnv(Remade):
         self._elapsed[ids] = 0
         self._speeds.begin(ids)
         state = self._read()
-        if self._varying is not None and self._varying.scatter(self.simulation, state, ids):
+        if self._randomizer is not None and self._randomizer.scatter(self.simulation, state, ids):
             state = self._read()
         self.simulation.hold(state)
-        if self._varying is not None:
-            self._varying.rest(self.simulation, state, ids)
+        if self._randomizer is not None:
+            self._randomizer.rest(self.simulation, state, ids)
         task.memory.renew(self._remembered.checked(task.remember(state)), ids)
         expect_nothing(task, "begin_episodes", task.begin_episodes(state, ids))
         info = self._info(state)
         check_info(self.task_class.__name__, info)
         self.observer.changed(ids)
         obs = self._observation(state, info, ids)
-        if self._varying is not None:
-            info |= self._varying.info()
+        if self._randomizer is not None:
+            info |= self._randomizer.info()
         return _tensors(obs), {**_tensors(info), "reconfigure": reconfigured}
 
     def _describe_observation(self) -> None:
@@ -489,12 +494,12 @@ class TaskEnv(Remade):
         if mode.nothing:
             return {}
         parts = {} if mode.columns else self._observed.checked(self.task.observe(state, info))
-        varying = self._varying
+        randomizer = self._randomizer
         try:
-            if varying is None:
+            if randomizer is None:
                 return self.observer.observe(self.simulation, state, parts)
-            noisy = varying.sensors(lambda: self.observer.names(parts), self._elapsed)
-            return varying.seen(self.observer.observe(self.simulation, state, parts, noisy), ids)
+            noisy = randomizer.sensors(lambda: self.observer.names(parts), self._elapsed)
+            return randomizer.seen(self.observer.observe(self.simulation, state, parts, noisy), ids)
         except NotFinite:
             refuse_observation(state, parts, self.task, self._speeds, self._elapsed)
 
@@ -529,18 +534,3 @@ def _tensors(tree: Any) -> Any:
     if isinstance(tree, dict):
         return {key: _tensors(value) for key, value in tree.items()}
     return _tensor(tree)
-
-
-def built_layout(task_class: type[MultiRobotTask], scenario: Scenario) -> Layout:
-    """Return the layout that environments of a scenario are built with, in its control mode.
-
-    Raises:
-        TaskError: If its places are not the task's, or a robot lacks what its place needs.
-        DescriptorError: If a robot lacks the joint limits that the control mode needs.
-    """
-    name, given, places = task_class.__name__, scenario.layout, task_class.layout.places
-    counts, needs = task_class.robot_counts, task_class.needs
-    check_places(name, given, places, counts, scenario.bystanders)
-    check_needs(name, given, given.places if counts else places, needs)
-    still = settled(given, places, counts, scenario.bystanders)
-    return still.in_control_mode(scenario.control_mode)

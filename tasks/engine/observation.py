@@ -26,10 +26,10 @@ from tasks.engine.columns import (
     Viewpoint,
     picture_column,
 )
-from tasks.engine.finite import NotFinite
+from tasks.engine.divergence import NotFinite
 from tasks.native import controllers
 from tasks.native.format import observation_keys
-from tasks.varying.noise import Noisy
+from tasks.randomization.noise import Noisy
 
 if TYPE_CHECKING:
     from robot_layouts.simulation.rendering import Observers, View

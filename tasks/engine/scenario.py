@@ -5,21 +5,22 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
 from layouts import Layout
+from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_choice, checked_flag, checked_whole, shown
 from robot_layouts.simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from robot_layouts.simulation.backend import SIMULATORS
 from robot_layouts.simulation.physics import substeps
 from robots import TaskError, UnknownNameError
-from tasks.engine.bystanders import BYSTANDERS
 from tasks.engine.cameras import checked_size
 from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
-from tasks.varying.randomization import Randomization
+from tasks.language.needs import ACT, HOLD
+from tasks.randomization.declaration import Randomization
 
 RENDER_MODES = (None, "rgb_array")
 LEAST_BYTES = 400_000  # of an environment: that of PickCube-v1, one of the smallest, takes 435 kB
@@ -127,7 +128,7 @@ class Scenario:
         for name, choices in (
             ("simulator", tuple(SIMULATORS)),
             ("render_mode", RENDER_MODES),
-            ("bystanders", BYSTANDERS),
+            ("bystanders", (None, HOLD, ACT)),
             ("reward_mode", (None, *reward_modes)),
         ):
             checked_choice(name, getattr(self, name), choices, TaskError)
@@ -145,6 +146,32 @@ class Scenario:
         _check_cameras(self.cameras)
         if self.camera_size is not None:
             checked_size("camera_size", self.camera_size)
+
+
+class ScenarioFields(TypedDict, total=False):
+    """Fields of `Scenario` that `tasks.make` takes by keyword alone, for type checkers."""
+
+    physics: PhysicsSettings | None
+    control_mode: str | Mapping[str, str] | None
+    control_frequency: float
+    max_episode_steps: int | None
+    render_mode: str | None
+    headless: bool
+    cameras: Sequence[Camera]
+    camera_size: tuple[int, int] | None
+    simulator: str
+    check_layout: bool
+    bystanders: str | None
+    randomization: Randomization | None
+
+
+class MakingFields(ScenarioFields, total=False):
+    """What `tasks.make` takes besides the task and the number of environments."""
+
+    robots: RobotLike | Mapping[str, RobotLike] | None
+    layout: Layout | None
+    obs_mode: str
+    reward_mode: str | None
 
 
 def check_control_mode(layout: Layout, mode: object) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,22 +11,55 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.simulation import Camera, PhysicsSettings, Simulation, State, World
-from robot_layouts.simulation.maths import Array, Floats
-from tasks.engine.memory import Memory
+from robot_layouts.simulation.maths import Array, Floats, copy
+from robots import UnknownNameError
 from tasks.engine.scenario import Scenario
 from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
 from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
-from tasks.varying.distributions import Distribution, Normal
-from tasks.varying.noise import noise
-from tasks.varying.randomization import Randomization
-from tasks.varying.varying import Varying
+from tasks.randomization.declaration import Randomization
+from tasks.randomization.distributions import Distribution, Normal
+from tasks.randomization.noise import noise
+from tasks.randomization.randomizer import Randomizer
 
 Info = dict[str, Any]
 
 DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
 SPARSE_MODES = ("sparse", "none")
 _NORMAL = Normal(1.0)
+
+
+class Memory(SimpleNamespace):
+    """Arrays by name, (N, …) each, as attributes."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Refuse what is not there.
+
+        Raises:
+            NotRememberedError: Always.
+        """
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise NotRememberedError("array that remember() returned", name, vars(self))
+
+    def renew(self, fresh: Mapping[str, Array], env_ids: Sequence[int]) -> None:
+        """Take the rows of environments that were reset; the others stay.
+
+        Args:
+            fresh: Every array, with all rows; those of ``env_ids`` are taken.
+            env_ids: Which environments.
+        """
+        for name, rows in fresh.items():
+            if name not in vars(self) or len(env_ids) == len(rows):
+                setattr(self, name, copy(rows))
+            else:
+                kept = copy(getattr(self, name))  # somebody may hold the earlier one
+                kept[list(env_ids)] = rows[list(env_ids)]
+                setattr(self, name, kept)
+
+
+class NotRememberedError(UnknownNameError, AttributeError):
+    """An array that the task does not remember (also an ``AttributeError``)."""
 
 
 class Task:
@@ -80,7 +114,7 @@ class Task:
     simulation: Simulation
     moving: Sequence[int]
     memory: Memory
-    _varying: Varying | None
+    _randomizer: Randomizer | None
     _rngs: Sequence[EpisodeRandom]
     _elapsed: NDArray[np.int32]
 
@@ -193,20 +227,20 @@ class Task:
         Returns:
             Such as ``{"mass": {"cube": 1.31}}``; see `tasks.Randomization`. None if nothing varies.
         """
-        return None if self._varying is None else self._varying.drawn(env)
+        return None if self._randomizer is None else self._randomizer.drawn(env)
 
     def standing(self, env: int = 0) -> Layout:
         """Return the layout as robots stand in the present episode of an environment.
 
         It is ``layout``, unless the bases of robots vary. What is planned is planned in this one.
         """
-        return self.layout if self._varying is None else self._varying.layout(env)
+        return self.layout if self._randomizer is None else self._randomizer.layout(env)
 
     def scale(self, body: str) -> Floats:
         """Return the factor by which a body is larger than declared, (N,); 1 if sizes are fixed."""
-        if self._varying is None:
+        if self._randomizer is None:
             return np.ones(self.num_envs, np.float32)
-        return self._varying.scale(body)
+        return self._randomizer.scale(body)
 
     def noise(self, name: str, width: int, drawn: Distribution = _NORMAL) -> Floats:
         """Return noise for `observe`, a function of each episode's seed and step alone.

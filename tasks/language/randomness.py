@@ -13,7 +13,7 @@ from torch import Tensor
 from layouts import Layout
 from robot_layouts.simulation.maths import sqrt
 from robots import TaskError
-from tasks.varying.streams import Stream
+from tasks.randomization.distributions import Stream
 
 
 class FirstSeeds:

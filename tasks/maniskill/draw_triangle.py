@@ -23,7 +23,7 @@ from tasks import (
 )
 from tasks.maniskill.clone import Clone
 from tasks.maths import Array, concatenate, where, zeros
-from tasks.native.outline import near, placed_corners, points_along, side_middles
+from tasks.native.drawing import near, placed_corners, points_along, side_middles
 
 # mani_skill 3.0.1, envs/tasks/drawing/draw_triangle.py (m, rad)
 MAX_DOTS = 300

@@ -23,7 +23,7 @@ from tasks import (
 )
 from tasks.maniskill.clone import Clone
 from tasks.maths import Array, Floats, cos, rounded, sqrt, where
-from tasks.native.pixel_cover import CENTRE_OF_MASS_Y, cover, yaw
+from tasks.native.drawing import CENTRE_OF_MASS_Y, cover, yaw
 
 # mani_skill 3.0.1, envs/tasks/tabletop/push_t.py (m, rad)
 BAR_HALF_SIZE = (0.1, 0.025)

@@ -132,17 +132,6 @@ def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
     return tree
 
 
-def flattened(tree: Mapping[str, Any], above: str = "") -> dict[str, Any]:
-    """Return mappings of mappings as one mapping by ``a/b/c``."""
-    flat: dict[str, Any] = {}
-    for name, value in tree.items():
-        if isinstance(value, Mapping):
-            flat.update(flattened(value, f"{above}{name}/"))
-        else:
-            flat[f"{above}{name}"] = value
-    return flat
-
-
 def _whole(layout: Layout, robot: str, own: Sequence[Remembered]) -> bool:
     groups = layout[robot].robot.action_split.groups
     driven = {name for name, group in groups.items() if group.size}

@@ -17,7 +17,7 @@ from robot_layouts.simulation import Simulation, State
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.readout import ReadoutIndex
 from robots import TaskError, unknown_name_message
-from tasks.arrays import array_of
+from tasks.arrays import array_of, leaves
 from tasks.native import controllers
 from tasks.native.controllers import CONTROLLER
 
@@ -276,7 +276,7 @@ def _checked_rows(
         if group not in known:
             raise TaskError(unknown_name_message("state group", group, known))
         if group == CONTROLLER and isinstance(values, Mapping):
-            values = controllers.flattened(values)
+            values = dict(leaves(values))
         for key, value in _items(values, group):
             if key not in known[group]:
                 raise TaskError(unknown_name_message(f"entry of {group}", key, known[group]))

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from robot_layouts.core.processes import worker
 from robot_layouts.data.playing.executor import Event, report
 from robots import TaskError
-from tasks.processes import worker
 
 TASK = "PushT-v1"
 BARRIER = "TEST_BARRIER"  # environment variable: a folder where `at_random` waits, if it exists

@@ -14,11 +14,11 @@ from robot_layouts.data.playing.replay import replay, task_for
 from robot_layouts.data.reading.recording import Recording, TrajectoryError
 from robot_layouts.data.recording.record import FILE
 from robots import RecordingError
-from tasks.varying.axes import AXES
+from tasks.randomization.declaration import AXES
 from tests.data.clusters import running_cluster
 from tests.data.policies import Leans
 from tests.data.test_recorder import same_files
-from tests.tasks.varying.declarations import EVERY_AXIS, TASK, VARIED
+from tests.tasks.randomization.declarations import EVERY_AXIS, TASK, VARIED
 
 SOLVED = 0, 3  # seeds of worlds that vary in which the expert finds a way
 

@@ -26,7 +26,7 @@ from robot_layouts.kinematics.rotations import rotate
 from robots import TaskError, UnknownNameError
 from tasks.episode import play
 from tests.data.expert_plays import same_episodes
-from tests.tasks.varying.declarations import TASK, VARIED
+from tests.tasks.randomization.declarations import TASK, VARIED
 
 FORWARD, DOWN = 0.0, gripper_facing(0.0, 0.0)
 

@@ -147,7 +147,7 @@ def _task_of(front: Any) -> Any:
     front = getattr(front, "unwrapped", front)
     if hasattr(front, "vector"):
         front = front.vector
-    return front.task if hasattr(front, "task") else front._holder.batches[0]._task
+    return front.task if hasattr(front, "task") else front._backend.batches[0]._task
 
 
 def _begin(front: Any, **arguments: Any) -> Any:

@@ -44,7 +44,7 @@ SUDDEN_ENDS: dict[str, Callable[[Any], Any]] = {
 FORKING = """
 import os, sys, time
 import numpy as np
-from tasks.fronts.vector import VectorTask
+from tasks.interfaces.vector import VectorTask
 if __name__ == "__main__":
     env = VectorTask("PushCube-v1", 2, num_workers=2)
     one = VectorTask("PushCube-v1", 2, num_workers=0)

@@ -72,7 +72,7 @@ def _with_few_descriptors(more: int) -> None:
 LIMITED = """
 import os, sys, multiprocessing
 from robots import RobotLayoutsError
-from tasks.fronts.vector import VectorTask
+from tasks.interfaces.vector import VectorTask
 if __name__ == "__main__":
     try:
         VectorTask("PushCube-v1", 8, num_workers=8)

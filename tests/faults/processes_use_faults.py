@@ -154,7 +154,7 @@ def _fronts() -> dict[str, Callable[[], Any]]:
     import gymnasium
 
     import tasks
-    from tasks.fronts.vector import VectorTask
+    from tasks.interfaces.vector import VectorTask
 
     return {
         "a vector with workers": lambda: VectorTask(TASK, 2, num_workers=2),

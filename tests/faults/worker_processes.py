@@ -31,7 +31,7 @@ USES: dict[str, Callable[[Any], Any]] = {
 
 def failure(call: Callable[[], Any]) -> Any:
     """Return the `WorkerError` that a call ends with."""
-    from tasks.fronts.workers import WorkerError
+    from tasks.interfaces.workers import WorkerError
 
     try:
         call()
@@ -72,7 +72,7 @@ def command(pid: int) -> str:
 @contextmanager
 def vector(task_id: str = TASK, num_envs: int = 2, **fields: Any) -> Generator[Any]:
     """Give a vector, and close it in the end."""
-    from tasks.fronts.vector import VectorTask
+    from tasks.interfaces.vector import VectorTask
     from tests.tasks.breaking import offered
 
     with offered(), closing(VectorTask(task_id, num_envs, **{"num_workers": 1, **fields})) as env:
@@ -88,12 +88,12 @@ def actions(env: Any) -> Any:
 
 def worker_pid(env: Any, number: int) -> int:
     """Return the process of a vector's worker."""
-    return env._holder.workers[number].pid
+    return env._backend.workers[number].pid
 
 
 def living_workers(env: Any) -> list[int]:
     """Return the processes of a vector that live."""
-    return [worker.pid for worker in env._holder.workers.values() if session_of(worker.pid)]
+    return [worker.pid for worker in env._backend.workers.values() if session_of(worker.pid)]
 
 
 def session_of(pid: int) -> int:

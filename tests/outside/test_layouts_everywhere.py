@@ -19,7 +19,7 @@ from robots import ActionError, RobotRegistry, TaskError
 from tasks import Needs
 from tasks.__main__ import main as tasks_main
 from tasks.cell_options import chosen_robots
-from tasks.engine.bystanders import check_needs
+from tasks.engine.places import check_needs
 from tasks.episode import play
 from tasks.language.needs import gripper_opening
 from tests.data.recordings import edited

@@ -14,7 +14,7 @@ import tasks
 from robot_layouts.simulation.rendering import vulkan_problem
 from robots import TaskError, UnknownNameError
 from tasks import fronts
-from tasks.fronts.gymnasium import GymnasiumTask
+from tasks.interfaces.gymnasium import GymnasiumTask
 from tasks.registry import CATALOGUE
 from tests.quick import quick_cases
 

@@ -9,7 +9,7 @@ import tasks
 from robot_layouts.data import evaluate
 from robot_layouts.experts import find_expert
 from robots import TaskError
-from tasks.fronts.vector import UnknownAttributeError
+from tasks.interfaces.vector import UnknownAttributeError
 
 TASK = "TwoRobotPickCube-v1"
 SEEDS = [5, 6, 7]

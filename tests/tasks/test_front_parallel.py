@@ -106,6 +106,6 @@ def test_wrong_arguments(env):
 
 def test_without_pettingzoo_the_command_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pettingzoo", None)
-    monkeypatch.delitem(sys.modules, "tasks.fronts.parallel", raising=False)
+    monkeypatch.delitem(sys.modules, "tasks.interfaces.parallel", raising=False)
     with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[pettingzoo\]'"):
         tasks.parallel_env(TWO)

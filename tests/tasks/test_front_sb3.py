@@ -126,7 +126,7 @@ def test_success_in_the_last_step_is_no_lack_of_time(actions):
     env.reset()
     for _ in range(49):
         env.step(actions[0, :1] * 0)
-    task = env.vector._holder.batches[0]._task
+    task = env.vector._backend.batches[0]._task
     state = task.get_state_dict()
     state["actors"]["cube"][:, :2] = state["actors"]["goal_region"][:, :2]
     task.set_state_dict(state)
@@ -166,7 +166,7 @@ def test_seeds_and_options_count_once():
 
 def test_worlds_are_rebuilt_where_asked(monkeypatch):
     env = make()
-    simulation = env.vector._holder.batches[0]._task.simulation
+    simulation = env.vector._backend.batches[0]._task.simulation
     rebuilt, rebuild = [], simulation.rebuild
     monkeypatch.setattr(
         simulation, "rebuild", lambda ids, build: (rebuilt.append(ids), rebuild(ids, build))
@@ -269,7 +269,7 @@ def test_without_stable_baselines3_the_command_is_named(monkeypatch):
     for name in [name for name in sys.modules if name.startswith("stable_baselines3")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
-    monkeypatch.delitem(sys.modules, "tasks.fronts.sb3", raising=False)
+    monkeypatch.delitem(sys.modules, "tasks.interfaces.sb3", raising=False)
     with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[sb3\]'"):
         make()
 

@@ -8,7 +8,7 @@ import pytest
 import tasks
 from layouts import Layout, Placement, around_table, face_to_face, side_by_side
 from robots import LayoutError, RobotRegistry, TaskError
-from tasks.engine.layout_check import refuse_collisions
+from tasks.engine.places import refuse_collisions
 from tests.experts.free_motions import FreeRobots
 
 TWO = "TwoRobotPickCube-v1"

@@ -20,14 +20,14 @@ import pytest
 
 import tasks
 from benchmarks.soak import read_level
+from robot_layouts.core.processes.start import ProcessError
+from robot_layouts.core.processes.transport import RemoteError, SentError, packed
+from robot_layouts.core.processes.worker import Status, Worker
 from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import RobotLayoutsError, SimulationError, TaskError
-from tasks.fronts.vector import VectorTask
-from tasks.fronts.workers import WorkerError
-from tasks.processes.start import ProcessError
-from tasks.processes.transport import RemoteError, SentError, packed
-from tasks.processes.worker import Status, Worker
+from tasks.interfaces.vector import VectorTask
+from tasks.interfaces.workers import WorkerError
 from tests.fresh_process import in_fresh_process
 from tests.tasks import breaking
 
@@ -59,7 +59,7 @@ def task_of(env):
     """Return the task behind a front."""
     env = getattr(env, "unwrapped", env)
     env = getattr(env, "vector", env)
-    return env._holder.batches[0]._task if hasattr(env, "_holder") else getattr(env, "task", env)
+    return env._backend.batches[0]._task if hasattr(env, "_backend") else getattr(env, "task", env)
 
 
 # -- what is left ---------------------------------------------------------------------------------
@@ -132,7 +132,7 @@ def test_nothing_grows_over_five_hundred_vectors_with_workers():
 
 
 def look_around():
-    loaded = {"torch", "sapien", "tasks.fronts.workers"} <= {*sys.modules}
+    loaded = {"torch", "sapien", "tasks.interfaces.workers"} <= {*sys.modules}
     status = Path("/proc/self/status").read_text()
     return lambda: (
         (loaded, f"SigBlk:\t{1 << signal.SIGINT - 1:016x}" in status, os.sched_getaffinity(0)),

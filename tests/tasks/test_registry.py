@@ -13,7 +13,7 @@ from layouts import single
 from robot_layouts.simulation import Friction, PhysicsSettings, State, World
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import TaskError, UnknownNameError
-from tasks.engine.making import ScenarioFields
+from tasks.engine.scenario import ScenarioFields
 from tasks.registry import TASKS
 
 

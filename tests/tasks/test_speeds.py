@@ -11,7 +11,7 @@ import pytest
 from layouts import Layout, Placement
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError
-from tasks.engine.speeds import SpeedWatch
+from tasks.engine.divergence import SpeedWatch
 from tasks.maniskill.two_robot_pick_cube import TwoRobotPickCube
 from tests.tasks.made import STILL, make
 
@@ -78,7 +78,7 @@ def test_what_moves_as_fast_as_it_may_is_not_reported():
 @pytest.fixture
 def strict(monkeypatch):
     """Let what PhysX lets a joint keep be too much: it allows 100 rad/s."""
-    monkeypatch.setattr("tasks.engine.speeds.REFUSES", 12.0)
+    monkeypatch.setattr("tasks.engine.divergence.REFUSES", 12.0)
 
 
 @pytest.mark.usefixtures("strict")

@@ -8,7 +8,7 @@ import pytest
 
 import tasks
 from robots import TaskError
-from tasks.fronts.vector import VectorTask
+from tasks.interfaces.vector import VectorTask
 from tasks.language.randomness import FirstSeeds
 
 TASK = "PushCube-v1"

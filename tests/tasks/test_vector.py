@@ -9,7 +9,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import tasks
 from robots import ActionError, TaskError, UnknownNameError
-from tasks.fronts.vector import VectorTask
+from tasks.interfaces.vector import VectorTask
 from tests.native import NATIVE, pair
 from tests.quick import quick_cases
 
@@ -156,7 +156,7 @@ def test_an_ended_episode_waits_for_its_reset():
 
 def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
     env = make()
-    simulation = env._holder.batches[0]._task.simulation
+    simulation = env._backend.batches[0]._task.simulation
     moved, step = [], simulation.step
 
     def spy(action, joint_positions, env_ids=None):
@@ -179,7 +179,7 @@ def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
 def test_terminations_may_be_ignored(ignored):
     env = make(ignore_terminations=ignored, autoreset_mode="SAME_STEP")
     env.reset(seed=0)
-    task = env._holder.batches[0]._task
+    task = env._backend.batches[0]._task
     state = task.get_state_dict()
     state["actors"]["cube"][1, :2] = state["actors"]["goal_region"][1, :2]
     task.set_state_dict(state)
@@ -226,8 +226,8 @@ def test_what_it_returns_stays_as_it_is():
 
 def test_an_action_is_checked_once():
     env = VectorTask("PickCube-v1", num_envs=2, num_workers=0)
-    checked = env._holder.batches[0]._task._reader.checked
-    assert np.shares_memory(checked, env._holder.arrays["action"])
+    checked = env._backend.batches[0]._task._reader.checked
+    assert np.shares_memory(checked, env._backend.arrays["action"])
     wrong = np.zeros((2, 8), np.float32)
     wrong[1, 2] = np.inf
     with pytest.raises(ActionError, match="action number 2 is inf in environment 1"):

@@ -10,8 +10,8 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from robots import ActionError, SimulationError, TaskError
-from tasks.fronts.vector import VectorTask
-from tasks.fronts.workers import WorkerError, shared_out
+from tasks.interfaces.vector import VectorTask
+from tasks.interfaces.workers import WorkerError, partition
 from tests.quick import quick_cases
 from tests.tasks.test_vector import differences, make
 from tests.tasks.test_vector_failures import interrupted
@@ -117,7 +117,7 @@ def test_a_step_of_one_leaves_what_was_said_of_another_of_its_part():
 @pytest.mark.long
 def test_nobody_waits_for_the_slowest(shared):
     shared.reset(seed=0)
-    slow, quick = shared._holder.workers[0], [2, 3, 4]
+    slow, quick = shared._backend.workers[0], [2, 3, 4]
     os.kill(slow.pid, signal.SIGSTOP)
     try:
         shared.send(np.zeros((NUM_ENVS, 8), np.float32), EVERYONE)
@@ -185,14 +185,14 @@ def test_a_reset_forgets_what_was_sent(shared):
 @pytest.mark.long
 def test_a_worker_that_dies_is_told_and_the_others_can_be_received(shared):
     shared.reset(seed=7)
-    victim = shared._holder.workers[0].pid
+    victim = shared._backend.workers[0].pid
     os.kill(victim, signal.SIGSTOP)  # or it may have taken its steps before it dies
     shared.send(np.zeros((NUM_ENVS, 8), np.float32), EVERYONE)
     os.kill(victim, signal.SIGKILL)
     with pytest.raises(WorkerError, match=r"environments \[0, 1\] of seeds \[7, 8\]"):
         [shared.recv() for _ in range(2)]
     shared.restart()
-    away = sorted(shared._holder.pending.env_ids)
+    away = sorted(shared._backend.pending.env_ids)
     assert set(away) <= {2, 3, 4}
     back = [i for i in range(NUM_ENVS) if i not in away]
     shared.send(np.zeros((len(back), 8), np.float32), back)
@@ -217,7 +217,7 @@ def test_it_is_of_use_after_an_interrupt_at_any_instruction(shared):
     moment, met = 1, 0
     while interrupted(moment, "opcode", hears, both):
         shared.batch_size = 1
-        while shared._holder.pending.env_ids:
+        while shared._backend.pending.env_ids:
             shared.recv()
         shared.batch_size = 2
         shared.reset(seed=3)
@@ -239,5 +239,5 @@ def test_it_is_of_use_after_an_interrupt_at_any_instruction(shared):
     ],
 )
 def test_how_environments_are_shared(sizes, shares):
-    found = shared_out(*sizes)
+    found = partition(*sizes)
     assert [[(ids.start, ids.stop) for ids in share] for share in found] == shares

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from layouts import face_to_face
+from robot_layouts.core.processes.worker import Worker
 from robots import SimulationError, TaskError
-from tasks.fronts.vector import VectorTask
-from tasks.fronts.workers import WorkerError
-from tasks.processes.worker import Worker
+from tasks.interfaces.vector import VectorTask
+from tasks.interfaces.workers import WorkerError
 from tests.tasks import breaking
 
 GONE, LEFT = [0, 1], [2, 3]  # environments of the first worker and of the second
@@ -36,7 +36,7 @@ def shared():
 
 
 def first_worker(env):
-    return env._holder.workers[0].pid
+    return env._backend.workers[0].pid
 
 
 @pytest.mark.long
@@ -47,11 +47,11 @@ def test_a_worker_that_fails_is_told_and_replaced(shared, how):
         env.reset(seed=40, options={"reconfigure": True})
         env.step(ACTION)
     victim = first_worker(shared)
-    shared._holder.timeout = 30.0 if how == "killed" else 3.0
+    shared._backend.timeout = 30.0 if how == "killed" else 3.0
     os.kill(victim, signal.SIGKILL if how == "killed" else signal.SIGSTOP)
     with pytest.raises(WorkerError) as caught:
         shared.step(ACTION)
-    shared._holder.timeout = 30.0
+    shared._backend.timeout = 30.0
     error = caught.value
     assert error.env_ids == GONE
     assert error.seeds == [40, 41]
@@ -138,7 +138,7 @@ def interrupted(moment, event, matches, call):
 @pytest.mark.long
 def test_a_vector_is_of_use_after_an_interrupt_at_any_instruction_of_a_conversation():
     def talks(code):
-        return code.co_filename.endswith(("fronts/workers.py", "processes/worker.py"))
+        return code.co_filename.endswith(("interfaces/workers.py", "processes/worker.py"))
 
     with closing(VectorTask("PushCube-v1", num_envs=2, num_workers=2, timeout=5.0)) as env:
         action = np.full((2, 8), 0.2, np.float32)
@@ -154,7 +154,7 @@ def test_a_vector_is_of_use_after_an_interrupt_at_any_instruction_of_a_conversat
 
 def test_an_interrupt_as_a_call_begins_locks_nobody_out():
     def begins(code):
-        return code.co_filename.endswith("fronts/vector.py") and code.co_name == "call"
+        return code.co_filename.endswith("interfaces/vector.py") and code.co_name == "call"
 
     with closing(VectorTask("PushCube-v1", num_envs=1, num_workers=0)) as env:
         for moment in (1, 2, 3):
@@ -173,7 +173,7 @@ def test_a_worker_s_death_is_seen_although_a_process_that_it_forked_holds_its_co
 @pytest.mark.long
 def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
     shared.reset(seed=0)
-    workers_of_it, living = shared._holder.workers, first_worker(shared)
+    workers_of_it, living = shared._backend.workers, first_worker(shared)
     for worker in [*workers_of_it.values()]:
         os.kill(worker.pid, signal.SIGKILL)
     with pytest.raises(WorkerError, match=r"environments \[0, 1\].*environments \[2, 3\]"):
@@ -253,7 +253,7 @@ def test_a_script_without_a_guard_is_told_so(tmp_path):
 SCRIPT = """
 import multiprocessing, sys, time
 import numpy as np
-from tasks.fronts.vector import VectorTask
+from tasks.interfaces.vector import VectorTask
 
 if __name__ == "__main__":
     env = VectorTask("PickCube-v1", num_envs=2, num_workers=1)

@@ -25,7 +25,7 @@ from lerobot.utils.constants import ACTION
 from layouts import Layout
 from robots import TaskError
 from tasks import Randomization, lerobot_vec_env
-from tasks.fronts.lerobot import PICTURES, PIXELS, STATES, LeRobotTask
+from tasks.interfaces.lerobot import PICTURES, PIXELS, STATES, LeRobotTask
 
 KINDS = {"environment_state": FeatureType.ENV}  # the others are states
 

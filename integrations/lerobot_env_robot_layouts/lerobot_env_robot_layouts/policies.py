@@ -12,7 +12,7 @@ from lerobot.policies import PreTrainedPolicy, get_policy_class, make_pre_post_p
 
 from tasks import get_task_class
 from tasks.description import instruction_of
-from tasks.fronts.lerobot import renamed
+from tasks.interfaces.lerobot import renamed
 
 
 class LeRobotPolicy:

@@ -7,6 +7,9 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
 from typing import Any, Protocol
 
+from robot_layouts.core.processes.start import preload
+from robot_layouts.core.processes.transport import packed
+from robot_layouts.core.processes.worker import Pool, Reply, Worker, report
 from robot_layouts.data.playing.scheduler import (
     DEATHS_ALLOWED,
     EPISODE_SECONDS,
@@ -20,8 +23,6 @@ from robot_layouts.data.playing.scheduler import (
     check_count,
 )
 from robots import TaskError
-from tasks.processes.transport import packed
-from tasks.processes.worker import Pool, Reply, Worker, report
 
 __all__ = [
     "DEATHS_ALLOWED",
@@ -37,6 +38,8 @@ __all__ = [
     "play_all",
     "report",
 ]
+
+preload("tasks.engine.env", "robot_layouts.simulation")
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
 

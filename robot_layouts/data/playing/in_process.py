@@ -7,9 +7,9 @@ from typing import Any
 
 import torch
 
+from robot_layouts.core.processes.transport import as_ours
 from robot_layouts.data.playing.randomness import random_states, set_random_states
 from robot_layouts.data.playing.scheduler import Event, Play
-from tasks.processes.transport import as_ours
 
 
 class InProcessExecutor:

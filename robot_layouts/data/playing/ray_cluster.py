@@ -21,11 +21,11 @@ from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
 from robot_layouts.core.portable import inherited_variables
+from robot_layouts.core.processes.start import WorkerError
+from robot_layouts.core.processes.transport import is_installed
 from robot_layouts.core.rooms import PACKAGES
 from robots import MissingPackageError, TaskError, UnknownNameError
 from robots.assets.manifest import load_manifest
-from tasks.processes.start import WorkerError
-from tasks.processes.transport import is_installed
 
 _CONNECT_SECONDS = 10.0  # that a port may take to accept
 _JOIN_SECONDS = 60.0  # that all of joining may take, the import of Ray included

@@ -10,6 +10,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from robot_layouts.core.processes.transport import SentError, loaded, unsendable
+from robot_layouts.core.processes.worker import Reply, Status
 from robot_layouts.data.playing.environment import versions
 from robot_layouts.data.playing.ray_cluster import (
     Cluster,
@@ -28,8 +30,6 @@ from robot_layouts.data.playing.scheduler import (
     WorkerError,
     check_count,
 )
-from tasks.processes.transport import SentError, loaded, unsendable
-from tasks.processes.worker import Reply, Status
 
 PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
 

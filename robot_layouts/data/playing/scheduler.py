@@ -9,9 +9,9 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
+from robot_layouts.core.processes.start import WorkerError
+from robot_layouts.core.processes.worker import Reply, Status
 from robots import TaskError
-from tasks.processes.start import WorkerError
-from tasks.processes.worker import Reply, Status
 
 __all__ = [
     "Backend",

@@ -14,7 +14,7 @@ from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameErr
 from tasks import MultiRobotTask, TaskEnv, get_task_class, make
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
-from tasks.varying.randomization import Randomization
+from tasks.randomization.declaration import Randomization
 
 MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
 

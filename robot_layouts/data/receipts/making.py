@@ -22,7 +22,7 @@ from robots import RobotLayoutsError
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_checksums
 from tasks import MultiRobotTask, Scenario
-from tasks.varying.randomization import Randomization
+from tasks.randomization.declaration import Randomization
 
 _MOST = 10**6
 

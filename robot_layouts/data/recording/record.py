@@ -14,6 +14,7 @@ import tasks
 from layouts import Layout
 from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.processes.transport import as_ours
 from robot_layouts.data.playing.casting import Cast, Casting
 from robot_layouts.data.playing.executor import (
     EPISODE_SECONDS,
@@ -44,9 +45,8 @@ from robot_layouts.experts import find_expert
 from robots import RecordingError, TaskError
 from tasks import MultiRobotTask, Scenario
 from tasks.episode import PlayedEpisode, Policy, Score
-from tasks.processes.transport import as_ours
+from tasks.randomization.declaration import Randomization
 from tasks.registry import make_scenario
-from tasks.varying.randomization import Randomization
 
 FILE = "trajectory.h5"
 _TYPES = {kinds.EXPERT: "scripted", kinds.POLICY: "policy", kinds.PERSON: "human"}

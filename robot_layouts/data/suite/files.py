@@ -23,8 +23,7 @@ from robot_layouts.data.suite.suite import Case, Suite, checked_name
 from robots import LayoutError, RobotLayoutsError, TaskError, UnknownNameError
 from robots.named import robot_in_file
 from tasks import MultiRobotTask, get_task_class
-from tasks.varying.files import read_data
-from tasks.varying.randomization import Randomization
+from tasks.randomization.declaration import Randomization, read_data
 
 SHIPPED = {"standard": Path(__file__).with_name("standard.yaml")}
 """Suites that come with the library, by name."""

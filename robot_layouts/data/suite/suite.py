@@ -20,12 +20,12 @@ from robot_layouts.data.reading.manifest import spans_of
 from robots import RobotDescriptor, RobotLayoutsError, TaskError
 from robots.fingerprint import asset_fingerprint
 from robots.registry import ROBOTS
-from tasks.engine.env import built_layout
+from tasks.engine.places import built_layout
+from tasks.randomization.declaration import Randomization
 from tasks.registry import full_name, get_task_class, make_scenario
-from tasks.varying.randomization import Randomization
 
 if TYPE_CHECKING:
-    from tasks.engine.making import MakingFields
+    from tasks.engine.scenario import MakingFields
 
 FORMAT = 1
 SHORT = 12  # digits of a hash that tell suites apart

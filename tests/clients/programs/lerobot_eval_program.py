@@ -12,7 +12,7 @@ from robot_layouts.data import evaluate
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.record import record
-from tasks.fronts.lerobot import STATES
+from tasks.interfaces.lerobot import STATES
 
 TASK = "TwoRobotPickCube-v1"
 KNOWN, SEEDS = range(3), range(5)  # recorded seeds; those that are played

@@ -1,0 +1,135 @@
+"""Tasks behind the interfaces of Gymnasium, PettingZoo, Stable-Baselines3 and LeRobot.
+
+Importing this loads neither torch nor sapien; each front is loaded when one is made.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from robots import MissingPackageError
+from tasks.interfaces.spec import NAMESPACE, TaskSpec
+from tasks.registry import list_own, list_tasks
+
+if TYPE_CHECKING:
+    from tasks.interfaces.lerobot import LeRobotTask
+    from tasks.interfaces.parallel import ParallelTask
+    from tasks.interfaces.sb3 import SB3Task
+
+_GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
+
+__all__ = ["NAMESPACE", "lerobot_vec_env", "parallel_env", "register", "sb3_vec_env"]
+
+
+def register() -> None:
+    """Tell Gymnasium every task of `tasks.list_tasks` that it does not know yet.
+
+    Importing `tasks` does this, and so does registering a task. Names that are no Gymnasium ids
+    (those end with ``-v`` and a number) stay unknown to it. Tasks of a user's own module go by
+    their plain id, too, unless it is taken: so ``gymnasium.make("mylab.tray:TwoArmTray-v1")``,
+    which imports the module and looks the id up, finds them.
+    """
+    from gymnasium import registry
+
+    names = {f"{NAMESPACE}/{task_id}": task_id for task_id in list_tasks()}
+    names |= {task_id: task_id for task_id in list_own()}
+    for name, task_id in names.items():
+        if _GYMNASIUM_NAME.fullmatch(task_id) and name not in registry:
+            registry[name] = TaskSpec(
+                name,
+                entry_point="tasks.interfaces.gymnasium:GymnasiumTask",
+                vector_entry_point="tasks.interfaces.vector:VectorTask",
+                kwargs={"task_id": task_id},
+            )
+
+
+def parallel_env(
+    task_id: str, robot_reward: Callable[..., float] | None = None, **fields: Any
+) -> ParallelTask:
+    """Make a PettingZoo ``ParallelEnv`` of a task: one agent per robot, named as its place.
+
+    Args:
+        task_id: The task's id or another of its names.
+        robot_reward: What each robot earns; None gives every robot the task's reward. Called as
+            ``robot_reward(robot, observation, reward, info)`` with its place, what it observes
+            now, the task's reward and the info of the step.
+        fields: Other arguments of `tasks.make`; ``num_envs`` is not offered.
+
+    Raises:
+        MissingPackageError: If pettingzoo is not installed.
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that.
+    """
+    try:
+        from tasks.interfaces.parallel import ParallelTask
+    except ModuleNotFoundError as error:
+        if error.name != "pettingzoo":
+            raise
+        raise MissingPackageError(
+            "parallel_env needs pettingzoo; pip install 'robot-layouts[pettingzoo]'"
+        ) from error
+    return ParallelTask(task_id, robot_reward, **fields)
+
+
+def sb3_vec_env(
+    task_id: str, num_envs: int = 1, num_workers: int | None = None, **fields: Any
+) -> SB3Task:
+    """Make a Stable-Baselines3 ``VecEnv`` of a task, with the environments of its vector.
+
+    Policies learn from a flat state, ``"MlpPolicy"``, or from named parts of one and from images,
+    ``"MultiInputPolicy"`` with ``obs_mode="state_dict"`` or ``"rgb"``. Workers have one thread
+    each; those of this process stay torch's (``torch.set_num_threads``).
+
+    Args:
+        task_id: The task's id or another of its names.
+        num_envs: Number of environments.
+        num_workers: Number of processes; None takes one per core, 0 this process.
+        fields: ``ignore_terminations``, ``timeout`` and ``render_mode``, as
+            ``gymnasium.make_vec`` takes them, and other arguments of `tasks.make`.
+
+    Raises:
+        MissingPackageError: If stable-baselines3 is not installed.
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that.
+        AssetError: If robot files cannot be found.
+        WorkerError: If a worker ends before it is ready.
+    """
+    try:
+        from tasks.interfaces.sb3 import SB3Task
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] != "stable_baselines3":
+            raise
+        raise MissingPackageError(
+            "sb3_vec_env needs stable-baselines3; pip install 'robot-layouts[sb3]'"
+        ) from error
+    return SB3Task(task_id, num_envs, num_workers=num_workers, **fields)
+
+
+def lerobot_vec_env(
+    task_id: str, num_envs: int = 1, num_workers: int | None = None, **fields: Any
+) -> LeRobotTask:
+    """Make a vector of a task as ``lerobot-eval`` and LeRobot's EnvHub use them.
+
+    What is observed are the columns of exported LeRobot datasets, so that a policy that was trained
+    on one plays as it is; LeRobot itself is not needed here.
+
+    Args:
+        task_id: The task's id or another of its names.
+        num_envs: Number of environments.
+        num_workers: Number of processes; None takes one per core, 0 this process.
+        fields: ``obs_mode``, one of ``"lerobot"``, ``"lerobot+video"`` and ``"lerobot+cameras"``;
+            ``instruction``, what policies are asked to do if it is not the task's own sentence;
+            ``timeout`` and ``render_mode``, as ``gymnasium.make_vec`` takes them; and other
+            arguments of `tasks.make`.
+
+    Raises:
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that.
+        AssetError: If robot files cannot be found.
+        WorkerError: If a worker ends before it is ready.
+    """
+    from tasks.interfaces.lerobot import LeRobotTask
+
+    return LeRobotTask(task_id, num_envs, num_workers=num_workers, **fields)
