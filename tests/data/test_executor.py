@@ -7,6 +7,8 @@ import re
 import subprocess
 import sys
 import textwrap
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -324,6 +326,23 @@ def test_this_process_keeps_its_own_settings():
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(threads)
+
+
+def test_threads_that_play_in_this_process_take_turns():
+    def play(seed):
+        random.seed(seed)
+        first = random.random()
+        time.sleep(0.001)
+        return first, random.random()
+
+    def draws(_):
+        return [event.result for event in InProcessExecutor().run(lambda: play, range(20))]
+
+    before = random.getstate()
+    with ThreadPoolExecutor(3) as pool:
+        alone, *others = pool.map(draws, range(3))
+    assert others == [alone] * 2
+    assert random.getstate() == before
 
 
 @pytest.mark.parametrize("workers", [-1, True, 2.5, "2", float("nan"), [1]])

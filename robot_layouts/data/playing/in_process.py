@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Generator, Iterable
+from threading import RLock
 from typing import Any
 
 import torch
@@ -15,9 +17,9 @@ from tasks.processes.transport import as_ours
 class InProcessExecutor:
     """This very process, one episode after the other; what plays need not be picklable.
 
-    Nothing limits how long an episode takes. The number of torch's threads and the state of the
-    random generators are those of before whenever nothing is being played. If what plays has a
-    method ``close``, that is called in the end.
+    Nothing limits how long an episode takes, and threads take turns, an episode each. The number of
+    torch's threads and the state of the random generators are those of before whenever nothing is
+    being played. If what plays has a method ``close``, that is called in the end.
     """
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
@@ -44,12 +46,18 @@ def _played(play: Play, seed: int) -> Event:
 
 
 class _Inside:
-    """What a play sets for the whole process, put aside while it is not playing."""
+    """What a play sets for the whole process, put aside while it is not playing.
+
+    One thread plays at a time: others would change the settings under it, and restore its own.
+    """
+
+    _turn = RLock()
 
     def __init__(self) -> None:
         self._settings: tuple[Any, ...] | None = None
 
     def __enter__(self) -> None:
+        self._turn.acquire()
         self._outside = _settings()
         if self._settings is not None:
             _set(*self._settings)
@@ -57,6 +65,15 @@ class _Inside:
     def __exit__(self, *error: object) -> None:
         self._settings = _settings()
         _set(*self._outside)
+        self._turn.release()
+
+    @classmethod
+    def begin_fork(cls) -> None:
+        """Let a fork play, in which the thread that was playing does not go on."""
+        cls._turn = RLock()
+
+
+os.register_at_fork(after_in_child=_Inside.begin_fork)
 
 
 def _settings() -> tuple[Any, ...]:
