@@ -99,9 +99,9 @@ def teleop(
     import_viser()
 
     import tasks
+    from robot_layouts.data.actors import find_policy
     from robot_layouts.data.recording.record import FILE
     from robot_layouts.data.recording.recorder import Recorder
-    from robot_layouts.data.sources.policies import find_policy
     from robot_layouts.data.teleop.page import serve
     from robot_layouts.data.teleop.session import Session
 
@@ -270,8 +270,7 @@ def report(
 
     from robot_layouts.core.progress import Progress
     from robot_layouts.core.writing import write_whole
-    from robot_layouts.data.dataset.page import render
-    from robot_layouts.data.dataset.report import make_report
+    from robot_layouts.data.dataset.report import make_report, render
 
     torch.set_num_threads(1)
     with Progress(unit="parts") as line:

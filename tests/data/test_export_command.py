@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import robot_layouts.core.progress as progress
-import robot_layouts.data.export.pictures as pictures
+import robot_layouts.data.export.drawing as pictures
 import tasks
 from layouts import Layout, Placement
 from robot_layouts.__main__ import main

@@ -9,7 +9,7 @@ import pytest
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.data.playing.plan_conversion import as_positions
+from robot_layouts.data.playing.mode_conversion import as_positions
 from robot_layouts.data.playing.replay import find_official, open_recording, replay, task_for
 from robot_layouts.data.reading.recording import Recording, TrajectoryError
 from robot_layouts.data.recording.recorder import Recorder

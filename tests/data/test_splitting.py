@@ -10,9 +10,9 @@ import h5py
 import pytest
 
 import tasks
-from robot_layouts.data.reading.manifest import manifest_path, read_manifest, spans_of
+from robot_layouts.data.reading.json_files import manifest_path, read_manifest, spans_of
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording import joined_files
+from robot_layouts.data.recording import recorder as recorders
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError, TaskError
 from tests.data.kills import Kill, Killed
@@ -128,8 +128,8 @@ def test_full_files_are_not_read_again(tmp_path, push_t, straight, monkeypatch):
         looked.append(file.name)
         return original(file)
 
-    original = joined_files.read_joined
-    monkeypatch.setattr(joined_files, "read_joined", read)
+    original = recorders.read_joined
+    monkeypatch.setattr(recorders, "read_joined", read)
     Recorder(path, env, resume=True, file_size=SIZE).close()
     assert looked == [sorted(p.name for p in path.parent.glob("*.h5"))[-1]]
     assert contents(path) == contents(straight)

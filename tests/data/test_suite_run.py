@@ -14,10 +14,16 @@ from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate
 from robot_layouts.data.playing.executor import WorkerError
 from robot_layouts.data.receipts.receipt import Receipt, ReceiptError
-from robot_layouts.data.suite.files import load_suite, save_suite
-from robot_layouts.data.suite.folder import begin_run, read_run, receipt_path
-from robot_layouts.data.suite.run import chosen_cases, chosen_policies, run_suite, verify_run
-from robot_layouts.data.suite.suite import Case, Suite
+from robot_layouts.data.suite.run import (
+    begin_run,
+    chosen_cases,
+    chosen_policies,
+    read_run,
+    receipt_path,
+    run_suite,
+    verify_run,
+)
+from robot_layouts.data.suite.suite import Case, Suite, load_suite, save_suite
 from robots import TaskError, UnknownNameError
 from tasks import Randomization
 from tests.data.kills import Kill, Killed

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.reading.recording import Recording, Trajectory, TrajectoryError
-from robot_layouts.data.sources.actors import EXPERT
 from robots import RobotDescriptor
 from tasks import TaskEnv
 from tasks.engine.columns import placed_bodies

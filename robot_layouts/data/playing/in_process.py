@@ -1,17 +1,38 @@
-"""Plays whole episodes in this very process."""
+"""Plays whole episodes in this very process, whose random generators these begin with a seed."""
 
 from __future__ import annotations
 
 import os
+import random
 from collections.abc import Callable, Generator, Iterable
 from threading import RLock
 from typing import Any
 
+import numpy as np
 import torch
 
-from robot_layouts.data.playing.randomness import random_states, set_random_states
 from robot_layouts.data.playing.scheduler import Event, Play
 from tasks.processes.transport import as_ours
+
+
+def seed_all(seed: int) -> None:
+    """Begin all of them with a seed."""
+    random.seed(seed)
+    np.random.seed(seed)
+    torch.manual_seed(seed)
+
+
+def random_states() -> tuple[Any, ...]:
+    """Return where all of them are."""
+    return random.getstate(), np.random.get_state(), torch.get_rng_state()
+
+
+def set_random_states(states: tuple[Any, ...]) -> None:
+    """Go on from where all of them were."""
+    python, numpy, of_torch = states
+    random.setstate(python)
+    np.random.set_state(numpy)
+    torch.set_rng_state(of_torch)
 
 
 class InProcessExecutor:

@@ -12,7 +12,7 @@ from typing import Any
 
 from robot_layouts.data.playing.environment import versions
 from robot_layouts.data.playing.ray_cluster import (
-    Cluster,
+    RayCluster,
     check_address,
     import_ray,
     is_own,
@@ -87,7 +87,7 @@ class RayExecutor:
             return
         modules = [*self._modules, *filter(is_own, getattr(prepare, "modules", ()))]
         with joined(self._ray, self._address, modules):
-            cluster = Cluster(self._ray)
+            cluster = RayCluster(self._ray)
             backend = _Actors(self._ray, cluster, prepare)
             workers = self._workers or cluster.cpus
             yield from Scheduler(backend, seeds, workers, self._policy).events()
@@ -96,7 +96,7 @@ class RayExecutor:
 class _Actors:
     """The backend of a cluster, whose workers are actors."""
 
-    def __init__(self, ray: Any, cluster: Cluster, prepare: Callable[[], Play]) -> None:
+    def __init__(self, ray: Any, cluster: RayCluster, prepare: Callable[[], Play]) -> None:
         """Take what makes the plays.
 
         Raises:

@@ -14,7 +14,7 @@ from tasks.processes.start import WorkerError
 from tasks.processes.worker import Reply, Status
 
 __all__ = [
-    "Backend",
+    "WorkerBackend",
     "Event",
     "Play",
     "RetryPolicy",
@@ -95,7 +95,7 @@ class SeedWorker(Protocol):
 AnyWorker = TypeVar("AnyWorker", bound=SeedWorker)
 
 
-class Backend(Protocol[AnyWorker]):
+class WorkerBackend(Protocol[AnyWorker]):
     """Where workers come from: processes of this machine, or of others.
 
     A worker's first reply says that it is ready, or why it is not. Each seed then gets one reply,
@@ -196,7 +196,7 @@ class Scheduler(Generic[AnyWorker]):
 
     def __init__(
         self,
-        backend: Backend[AnyWorker],
+        backend: WorkerBackend[AnyWorker],
         seeds: Iterable[int],
         workers: int,
         policy: RetryPolicy,

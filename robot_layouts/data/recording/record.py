@@ -14,7 +14,19 @@ import tasks
 from layouts import Layout
 from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_whole
-from robot_layouts.data.playing.casting import Cast, Casting
+from robot_layouts.data.actors import (
+    DESCRIPTION,
+    EXPERT,
+    PERSON,
+    POLICY,
+    TYPE,
+    Actor,
+    actor_of,
+    check_policy,
+    combined,
+    episode_source,
+    find_policy,
+)
 from robot_layouts.data.playing.executor import (
     EPISODE_SECONDS,
     Event,
@@ -26,20 +38,17 @@ from robot_layouts.data.playing.executor import (
     play_all,
 )
 from robot_layouts.data.playing.seeds import checked_seeds
-from robot_layouts.data.playing.together import BatchError, grouped, one_by_one, record_together
+from robot_layouts.data.playing.together import (
+    BatchError,
+    Cast,
+    Casting,
+    grouped,
+    one_by_one,
+    record_together,
+)
 from robot_layouts.data.reading.provenance import describe_layout, differences, listing
 from robot_layouts.data.recording.episode_files import PartEncoder
 from robot_layouts.data.recording.recorder import FILE_SIZE, Recorder
-from robot_layouts.data.sources import actors as kinds
-from robot_layouts.data.sources.actors import (
-    DESCRIPTION,
-    TYPE,
-    Actor,
-    actor_of,
-    combined,
-    episode_source,
-)
-from robot_layouts.data.sources.policies import EXPERT, check_policy, find_policy
 from robot_layouts.experts import find_expert
 from robots import RecordingError, TaskError
 from tasks import MultiRobotTask, Scenario
@@ -49,7 +58,7 @@ from tasks.registry import make_scenario
 from tasks.varying.randomization import Randomization
 
 FILE = "trajectory.h5"
-_TYPES = {kinds.EXPERT: "scripted", kinds.POLICY: "policy", kinds.PERSON: "human"}
+_TYPES = {EXPERT: "scripted", POLICY: "policy", PERSON: "human"}
 LOST_IN_A_ROW = 10  # episodes that workers died of, and none that was played, until all ends
 
 
@@ -91,7 +100,7 @@ class Actors:
                 )
             expert = find_expert(task.task_id)
             module, name = (getattr(expert, n, "") for n in ("__module__", "__qualname__"))
-            described = Actor(kinds.EXPERT, f"{module}:{name or expert}")
+            described = Actor(EXPERT, f"{module}:{name or expert}")
             return Cast(expert=expert, to_the_end=True), Actors((described,))
         acting, who = _found(policy, "policy")
         taking, taker = _found(takeover, "takeover")
@@ -108,7 +117,7 @@ class Actors:
 
     def sign(self, episode: PlayedEpisode) -> PlayedEpisode:
         """Write into an episode who acted in it; an expert's says so in the header alone."""
-        if self.actors[0].kind == kinds.EXPERT:
+        if self.actors[0].kind == EXPERT:
             return replace(episode, actor=None)
         turns = episode.actor
         assert turns is not None  # whoever plays keeps them

@@ -1,4 +1,4 @@
-"""Who acted in an episode, as plain data that its recording keeps."""
+"""Who acts: policies by name, and what a recording keeps of experts, policies and people."""
 
 from __future__ import annotations
 
@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.files import open_regular
-from robots import RecordingError, UnreadableFileError
+from robot_layouts.core.importing import imported
+from robots import RecordingError, TaskError, UnreadableFileError
 
-EXPERT, POLICY, PERSON = "expert", "policy", "person"
+EXPERT = "expert"
+POLICY, PERSON = "policy", "person"
 MIXED, CORRECTION = "mixed", "correction"
 
 TYPE, DESCRIPTION = "source_type", "source_desc"  # ManiSkill's fields of a recording's header
@@ -30,6 +32,42 @@ _CHUNK = 2**20  # bytes read at a time
 Turns = NDArray[np.uint8]
 Source = tuple[str | None, str | None]
 """What a recording says of its source as a whole: ``source_type`` and ``source_desc``."""
+
+
+def find_policy(name: str, what: str = "policy") -> Any:
+    """Return what ``MODULE:NAME`` names, or the word ``"expert"`` as it is.
+
+    Args:
+        name: The name.
+        what: What is looked for, in a word that an error uses.
+
+    Raises:
+        TaskError: If it cannot be imported.
+    """
+    if name == EXPERT and what == "policy":
+        return name
+    module, _, attribute = name.partition(":")
+    if not module or not attribute:
+        word = f", or the word {EXPERT!r}" if what == "policy" else ""
+        raise TaskError(f"{what} is {name!r}; it must be MODULE:NAME, something callable{word}")
+    return check_policy(imported(name, what, TaskError), what)
+
+
+def check_policy(policy: Any, what: str = "policy") -> Any:
+    """Return what gives actions, or refuse what cannot.
+
+    Raises:
+        TaskError: If it is not callable, or a class.
+    """
+    if isinstance(policy, type):
+        raise TaskError(
+            f"{what} is the class {policy.__qualname__}; give an instance of it, such as"
+            f" {policy.__qualname__}()"
+        )
+    if not callable(policy):
+        word = f", or the word {EXPERT!r}" if what == "policy" else ""
+        raise TaskError(f"{what} is {policy!r}; it must be callable, obs → action{word}")
+    return policy
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
-"""Draws the episodes of a recording in workers, and hands their pictures out in its order."""
+"""Draws recorded episodes, moment by moment, in this process or in workers."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +13,134 @@ import torch
 
 from layouts import Layout
 from layouts.placement import RobotLike
-from robot_layouts.data.export.columns import ColumnReader
-from robot_layouts.data.export.pictures import Drawing
-from robot_layouts.data.export.shots import Channel, Frame, Picture, Shots
+from robot_layouts.data.export.columns import ColumnReader, Columns, state_row
+from robot_layouts.data.export.shots import RGB, Frame, Picture, PictureChannel, Shots
 from robot_layouts.data.playing.executor import Executor, modules_of, play_all, report
 from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.reading.recording import Recording
-from tasks import MultiRobotTask
+from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.video import INSTALL
+from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.rendering.pictures import SIZE, Cameras, Observers, vulkan_problem
+from robots import MissingPackageError, SimulationError
+from tasks import MultiRobotTask, TaskEnv
+from tasks.engine.columns import OVERVIEW
+from tasks.episode import States, moments, open_loop
+
+SHAPE = (SIZE, SIZE, 3)  # of the overview
+
+
+def require_pictures(*, video: bool, images: bool, driver: bool, without: str) -> None:
+    """Refuse to go on where no pictures can be made.
+
+    Args:
+        video: Whether videos are written.
+        images: Whether png images are.
+        driver: Whether this process draws them.
+        without: What to leave out then, in words.
+
+    Raises:
+        MissingPackageError: If a package that writes them is not installed.
+        SimulationError: If there is no usable Vulkan driver.
+    """
+    if video and find_spec("imageio_ffmpeg") is None:
+        raise MissingPackageError(f"videos need imageio and ffmpeg: {INSTALL}")
+    if images and find_spec("PIL") is None:
+        raise MissingPackageError(f"png images need pillow: {INSTALL}")
+    if driver and (problem := vulkan_problem()):
+        raise SimulationError(f"no pictures can be drawn here: {problem}; export without {without}")
+
+
+class Drawing:
+    """The pictures of an episode as it was recorded; iterating draws them, moment by moment.
+
+    The actions are played, so that what is no part of a state is there too, and pictures are those
+    of ``obs_mode="rgb"`` to the last bit. Where the world does not follow the recording to the last
+    bit, it is put into the recorded state, from which links of robots are within a micrometre of
+    where they were.
+
+    Attributes:
+        exact: Whether the world followed the recording to the last bit, as far as it was drawn.
+    """
+
+    def __init__(
+        self, task: TaskEnv, columns: Columns, shots: Shots, *, last: bool = False
+    ) -> None:
+        """Prepare to draw.
+
+        Args:
+            task: Made with ``render_mode="rgb_array"``.
+            columns: The episode, of T steps.
+            shots: What is drawn of every moment.
+            last: Whether the state after the last step is drawn as well: T + 1 moments, not T.
+
+        Raises:
+            TrajectoryError: If the recording does not say with which seed the episode began.
+        """
+        if columns.seed is None:
+            raise TrajectoryError(
+                f"episode {columns.episode_id} names no seed, without which its scene cannot be"
+                " built; export without pictures"
+            )
+        self._task, self._columns, self._shots, self._seed = task, columns, shots, columns.seed
+        self._moments = len(columns) + last
+        self.exact = True
+
+    def __len__(self) -> int:
+        """Return the number of moments."""
+        return self._moments
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Play and draw."""
+        task, actions = self._task, open_loop(self._columns.actions)
+        happening = moments(task, self._seed, actions, len(self) - 1)
+        next(happening)
+        take = _taker(self._shots, task.simulation)
+        for t in range(len(self)):
+            if not _is_in_state(task, self._columns.states, t):
+                task.set_state_dict(state_row(self._columns.states, t))
+                self.exact = False
+            yield take()
+            next(happening, None)
+
+
+def _is_in_state(task: TaskEnv, states: States, t: int) -> bool:
+    current = task.get_state_dict()
+    return all(
+        np.array_equal(current[kind][name].numpy(), row)
+        for kind, rows in state_row(states, t).items()
+        for name, row in rows.items()
+    )
+
+
+def _taker(shots: Shots, simulation: Simulation) -> Callable[[], Frame]:
+    """Return what takes all pictures of the present moment."""
+    channels = shots.channels
+    whole = Cameras(simulation, *shots.viewpoint) if shots.viewpoint else None
+    observers = Observers(simulation, shots.cameras, shots.textures) if shots.cameras else None
+
+    def take() -> Frame:
+        taken: dict[tuple[str, str], Picture] = {}
+        if whole is not None:
+            taken[OVERVIEW, RGB] = whole.take()[0]
+        if observers is not None:
+            for name, view in observers.look(0).items():
+                for texture, image in view.images.items():
+                    taken[name, texture] = np.ascontiguousarray(image)
+        return {
+            channel: _expected(taken[channel.camera, channel.texture], channel)
+            for channel in channels
+        }
+
+    return take
+
+
+def _expected(picture: Picture, channel: PictureChannel) -> Picture:
+    if picture.shape != channel.shape or picture.dtype != channel.dtype:
+        raise SimulationError(
+            f"a picture of {channel.camera} has shape {picture.shape} and type {picture.dtype};"
+            f" {channel.shape} and {np.dtype(channel.dtype)} were asked for"
+        )
+    return picture
 
 
 @dataclass(frozen=True)
@@ -26,11 +148,11 @@ class DrawnEpisode:
     """The pictures of an episode; iterating gives them moment by moment.
 
     Attributes:
-        pictures: Channel → its pictures, (moments, height, width, k).
-        exact: See `robot_layouts.data.export.pictures.Drawing`.
+        pictures: PictureChannel → its pictures, (moments, height, width, k).
+        exact: See `robot_layouts.data.export.drawing.Drawing`.
     """
 
-    pictures: Mapping[Channel, Picture]
+    pictures: Mapping[PictureChannel, Picture]
     exact: bool
 
     def __iter__(self) -> Iterator[Frame]:
@@ -160,7 +282,7 @@ def _put_aside(path: Path, episode: DrawnEpisode) -> None:
     np.savez(path, exact=episode.exact, **pictures)  # pyright: ignore[reportArgumentType]
 
 
-def _take_back(path: Path, channels: Sequence[Channel]) -> DrawnEpisode:
+def _take_back(path: Path, channels: Sequence[PictureChannel]) -> DrawnEpisode:
     with np.load(path) as file:
         pictures = {channel: file[str(i)] for i, channel in enumerate(channels)}
         episode = DrawnEpisode(pictures, bool(file["exact"]))
