@@ -14,14 +14,14 @@ from robot_layouts.core.cli import Command, Program
 from robot_layouts.core.commands import start
 
 _FOR_USERS = {
-    "demo": "robot_layouts.data.commands:demo",
+    "demo": "robot_layouts.data.demo:demo",
     "record": "robot_layouts.data.playing_commands:record",
     "teleop": "robot_layouts.data.commands:teleop",
     "replay": "robot_layouts.data.commands:replay",
     "certify": "robot_layouts.data.playing_commands:certify",
-    "convert": "robot_layouts.data.commands:convert",
-    "export": "robot_layouts.data.commands:export",
-    "report": "robot_layouts.data.commands:report",
+    "convert": "robot_layouts.data.recording.convert:convert_command",
+    "export": "robot_layouts.data.export.dataset:export_command",
+    "report": "robot_layouts.data.dataset.report:report",
     "view": "robot_layouts.data.commands:view",
     "evaluate": "robot_layouts.data.playing_commands:evaluate",
     "verify": "robot_layouts.data.playing_commands:verify",

@@ -9,12 +9,17 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
+from robot_layouts.core.cli import Natural, Word
+from robot_layouts.core.commands import printable
 from robot_layouts.core.pages import Tile, data_address, fragment, page, plural
+from robot_layouts.core.progress import Progress as ProgressLine
+from robot_layouts.core.writing import write_whole
 from robot_layouts.data.dataset.certificate import RecordingCertificate, certificate_path
 from robot_layouts.data.dataset.contents import (
     Clip,
@@ -25,9 +30,13 @@ from robot_layouts.data.dataset.contents import (
     measure,
     read_contents,
 )
+from robot_layouts.data.playing.command_options import RecordingPath
 from robot_layouts.data.playing.replay import open_recording, task_for
 from robot_layouts.data.reading.recording import TrajectoryError, all_files, first_file
 from robot_layouts.data.video import video_problem
+from robots import RecordingError
+from robots.assets.progress import size
+from tasks.cell_options import Cell
 
 WIDTH, HEIGHT = 320, 132  # of a chart
 _BASE = HEIGHT - 18  # y of the axis
@@ -332,3 +341,50 @@ def _certificate(path: Path, remarks: list[str]) -> RecordingCertificate | None:
         remarks.append(f"{place.name} is of other files, and is not shown.")
         return None
     return found
+
+
+def report(
+    file: RecordingPath,
+    *,
+    out: Annotated[Path, Word("PAGE")],
+    clearances: Natural = 100,
+    clips: Natural = 4,
+    task: str | None = None,
+    cell: Cell,
+) -> None:
+    """Write one HTML page on a data set: counts, lengths, sources, variations, clips.
+
+    The page needs nothing else, and loads nothing. A certificate beside the recording is shown.
+    Exit code: 0 if the page was written, 1 if not, 2 for bad usage.
+
+    Args:
+        file: The folder of a recording, or one h5 file.
+        out: The HTML file.
+        clearances: Measure in N episodes how near robots came; needs the extra checks.
+        clips: Film N episodes; needs Vulkan and the extra video.
+        task: The recording's task; MODULE:ID for one of your own.
+        cell: Which robots stood where, where the recording cannot say it.
+
+    Raises:
+        RobotLayoutsError: If the recording cannot be read, or the page not be written.
+    """
+    torch.set_num_threads(1)
+    with ProgressLine(unit="parts") as line:
+
+        def show(done: float, total: float, what: str) -> None:
+            line.total = total
+            line.update(done, what)
+
+        made = make_report(
+            file,
+            task_id=task,
+            cell=cell.making(),
+            clearances=clearances,
+            clips=clips,
+            progress=show,
+        )
+    text = render(made)
+    write_whole(out, text, RecordingError)
+    print(printable(f"{out}: {size(len(text.encode()))}"))
+    for remark in made.remarks:
+        print(printable(remark))

@@ -11,13 +11,23 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from layouts import Layout
 from layouts.placement import RobotLike
 from robot_layouts.core.bounds import shown
+from robot_layouts.core.cli import Folder, Word
+from robot_layouts.core.commands import UsageError
+from robot_layouts.core.pages import plural
+from robot_layouts.core.progress import Progress as ProgressLine
 from robot_layouts.core.writing import PARTIAL, writing_errors, written_whole
 from robot_layouts.data.export.columns import ColumnReader, Columns, Credits, succeeded
+from robot_layouts.data.playing.command_options import (
+    PictureSize,
+    Players,
+    RecordingPath,
+    stop_signals,
+)
 from robot_layouts.data.playing.executor import ProcessExecutor
 from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory, TrajectoryError
@@ -403,3 +413,77 @@ def _origin(file: Recording, reader: ColumnReader) -> dict[str, Any]:
         "layout": file.layout,
         **({"actors": actors} if actors else {}),
     }
+
+
+def export_command(
+    recording: RecordingPath,
+    *,
+    format: Annotated[str, Word("FORMAT")],
+    out: Folder,
+    fps: int | None = None,
+    video: bool = False,
+    cameras: Sequence[Annotated[str, Word("NAME")]] | None = None,
+    images: bool = False,
+    depth: bool = False,
+    size: PictureSize | None = None,
+    instruction: Annotated[str, Word("TEXT")] | None = None,
+    include_failures: bool = False,
+    only_successes: bool = False,
+    task: str | None = None,
+    players: Players,
+) -> None:
+    """Write a recording as a dataset for LeRobot or robomimic.
+
+    The dataset appears when it is complete. Exit code: 0 if it was written, 1 if not, 2 for bad
+    usage.
+
+    Args:
+        recording: An h5 file, or a recording's folder.
+        format: Format of the dataset: lerobot or robomimic.
+        out: New folder for the dataset.
+        fps: Steps per second to state (default: the task's, 20).
+        video: Draw every step as well (lerobot; needs Vulkan).
+        cameras: Draw what these cameras see, as videos (lerobot) or arrays (robomimic): all,
+            overview, or by place: base_camera, left.hand_camera.
+        images: Write png images, which lose nothing, in place of videos.
+        depth: Write the cameras' depth as well (mm, 16 bits).
+        size: Width and height of the pictures in pixels (each camera's own).
+        instruction: What the policy is to do, in words (the task's own).
+        include_failures: Export episodes without success, too.
+        only_successes: What happens anyway.
+        task: The recording's task; MODULE:ID for one of your own.
+        players: Who plays.
+
+    Raises:
+        RobotLayoutsError: If the export fails; see `export`.
+    """
+    if include_failures and only_successes:
+        raise UsageError("--include-failures and --only-successes contradict each other")
+    wanted = Export(
+        recording,
+        format,
+        out,
+        fps=fps,
+        video=video,
+        include_failures=include_failures,
+        task=task,
+        cameras=cameras,
+        images=images,
+        depth=depth,
+        size=size,
+        instruction=instruction,
+    )
+    in_process = players.workers == 0 and players.ray is None
+    executor = None if in_process else players.executor()
+    with ProgressLine(unit="episodes") as line, stop_signals():
+
+        def show(done: float, total: int) -> None:
+            line.total = total
+            line.update(round(done, 1), f"exporting {recording.name}")
+
+        done = export(wanted, show, executor=executor, tell=line.say)
+    left_out = ""
+    if done.left_out:
+        failures = plural(done.left_out, "episode")
+        left_out = f"; left out: {failures} without success (--include-failures exports them)"
+    print(f"{done.folder}: {plural(done.episodes, 'episode')}, {done.steps} steps{left_out}")

@@ -144,6 +144,11 @@ class RecordingOption:
 
         return open_recording(self.file, self.task)
 
+    @staticmethod
+    def count(file: Recording, episodes: int | None) -> int:
+        """Return how many episodes of a file are asked for and there; None asks for all."""
+        return len(file) if episodes is None else max(0, min(episodes, len(file)))
+
 
 def tell(line: Progress, event: Event, failed: str = "") -> None:
     """Print what happened to workers and, if there are words for it, why an episode has failed."""

@@ -9,12 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
+from robot_layouts.core.cli import Folder
+from robot_layouts.core.commands import printable
+from robot_layouts.core.progress import Progress
+from robot_layouts.data.playing.command_options import ControlMode, RecordingOption
 from robot_layouts.data.playing.mode_conversion import converted_steps, why_lost
 from robot_layouts.data.playing.replay import FILE, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.data.recording.recorder import Recorder
+from robots import RecordingError
 from tasks.episode import PlayedEpisode, play
 
 
@@ -126,3 +132,39 @@ def _signed(played: PlayedEpisode, episode: Trajectory, steps: NDArray[np.intp])
     """
     actor = None if episode.actor is None else episode.actor[steps]
     return replace(played, source=episode.source, actor=actor)
+
+
+def convert_command(
+    recording: RecordingOption, *, to: ControlMode, out: Folder, episodes: int | None = None
+) -> int:
+    """Record the episodes of a recording again in another control mode.
+
+    Each episode is played in its own mode and in the other, and kept if it succeeds there too.
+    Those that did not succeed when they were recorded are left out. Exit code: 0 if all others were
+    kept, 1 if not, 2 for bad usage.
+
+    Args:
+        recording: The recording.
+        to: The other mode.
+        out: Folder of trajectory.h5 and .json.
+        episodes: Convert the first N episodes (all).
+
+    Raises:
+        RobotLayoutsError: If the recording cannot be played or the other not be written.
+    """
+    torch.set_num_threads(1)
+    with recording.open() as file:
+        count = recording.count(file, episodes)
+        if not count:
+            raise RecordingError(f"{file.path} has no episodes to convert")
+        with Progress(count, "episodes") as line:
+            summary = convert(
+                file,
+                to,
+                out,
+                count,
+                recording.cell.making(),
+                lambda: line.advance(1, "converting"),
+            )
+    print(printable(str(summary)))
+    return 0 if summary.complete else 1
