@@ -29,7 +29,8 @@ from benchmarks.records import (
 from parity.episodes import recorded_source
 from parity.lockstep import Run, play
 from robot_layouts.data.playing.mode_conversion import followed, turned
-from robot_layouts.data.playing.replay import open_recording, task_for
+from robot_layouts.data.playing.replay import open_recording
+from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.recording.convert import convert
 from robot_layouts.data.recording.record import FILE, record
 from robots import CONTROL_MODES, TaskError

@@ -157,8 +157,8 @@ def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
     Raises:
         TrajectoryError: If there is no such episode, or it cannot be shown.
     """
-    from robot_layouts.data.playing.replay import task_for
-    from robot_layouts.data.reading.recording import TrajectoryError
+    from robot_layouts.data.reading.json_files import TrajectoryError
+    from robot_layouts.data.reading.recorded_task import task_for
     from tasks.view import task_cell
 
     if not 0 <= number < len(file):
@@ -176,7 +176,7 @@ def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
 
 def _motion(task: TaskEnv, trajectory: Trajectory) -> Motion:
     """Reset the task as the episode began, and return what happens in it."""
-    from robot_layouts.data.reading.recording import TrajectoryError
+    from robot_layouts.data.reading.json_files import TrajectoryError
     from tasks.episode import REBUILT, play
     from tasks.view import recorded_motion
 
@@ -215,7 +215,8 @@ def replay(
     from rich.console import Console
 
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.playing.replay import replay, task_for
+    from robot_layouts.data.playing.replay import replay
+    from robot_layouts.data.reading.recorded_task import task_for
 
     torch.set_num_threads(1)
     with recording.open() as file:

@@ -29,7 +29,7 @@ from tasks.cell_options import Cell, PlacedRobot, chosen_robots
 
 if TYPE_CHECKING:
     from robot_layouts.data.dataset.certificate import RecordingCertificate
-    from robot_layouts.data.playing.executor import Event
+    from robot_layouts.data.playing.scheduler import Event
     from robot_layouts.data.recording.record import Summary
 
 
@@ -80,8 +80,8 @@ def record(
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.playing.executor import WorkerError
     from robot_layouts.data.recording import record as recording
+    from tasks.processes.start import WorkerError
 
     executor, line = players.executor(), Progress(episodes, "episodes")
     kept, solved = "0 episodes are recorded", 0

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from robot_layouts.data.playing.executor import Event, report
+from robot_layouts.data.playing.scheduler import Event
 from robots import TaskError
 from tasks.processes import worker
+from tasks.processes.worker import report
 
 TASK = "PushT-v1"
 BARRIER = "TEST_BARRIER"  # environment variable: a folder where `at_random` waits, if it exists

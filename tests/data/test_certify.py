@@ -13,7 +13,8 @@ from robot_layouts.__main__ import main
 from robot_layouts.data.dataset.certificate import RecordingCertificate, certify, sentences
 from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.playing.replay import first_difference
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError
 from tasks.episode import play

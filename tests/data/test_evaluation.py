@@ -15,10 +15,11 @@ import torch
 import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data import Evaluation, Score, evaluate
-from robot_layouts.data.playing.executor import ProcessExecutor, WorkerError
+from robot_layouts.data.playing.executor import ProcessExecutor
 from robot_layouts.experts import find_expert, registry
 from robots import TaskError, UnknownNameError
 from tasks.episode import REBUILT, play
+from tasks.processes.start import WorkerError
 from tests.data.plays import NO_PLAN, Here, at_random
 from tests.data.policies import TASK, Wanders, fails, still
 

@@ -17,16 +17,11 @@ import torch
 
 import robot_layouts.data.playing.scheduler
 from robot_layouts.data.playing.command_options import Players
-from robot_layouts.data.playing.executor import (
-    Event,
-    ProcessExecutor,
-    WorkerError,
-    WorkersDied,
-    choose_executor,
-    play_all,
-)
+from robot_layouts.data.playing.executor import ProcessExecutor, choose_executor, play_all
 from robot_layouts.data.playing.in_process import InProcessExecutor
+from robot_layouts.data.playing.scheduler import Event, WorkersDied
 from robots import TaskError
+from tasks.processes.start import WorkerError
 from tests.data.plays import (
     CannotBeLoaded,
     DiesOnce,

@@ -19,7 +19,8 @@ from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.export.drawing import Drawing, DrawnEpisode, draw_in_order
 from robot_layouts.data.export.lerobot import FileLimits, LeRobotWriter
 from robot_layouts.data.export.shots import PictureChannel, choose_shots
-from robot_layouts.data.playing.executor import Event, ProcessExecutor
+from robot_layouts.data.playing.executor import ProcessExecutor
+from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder

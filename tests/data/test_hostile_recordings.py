@@ -16,7 +16,8 @@ import pytest
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.reading import hdf5
 from robot_layouts.data.reading.hdf5 import ContentError, Hdf5File, LimitError, limited
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recording import Recording
 from robots import UnreadableFileError
 from tests.data.recordings import edited, record
 

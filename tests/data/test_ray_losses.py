@@ -16,10 +16,10 @@ import pytest
 
 import robot_layouts.data.playing.ray_cluster
 import robot_layouts.data.playing.scheduler
-from robot_layouts.data.playing.executor import WorkerError
 from robot_layouts.data.playing.ray_executor import RayExecutor
 from robot_layouts.data.recording.record import FILE
 from robots import TaskError
+from tasks.processes.start import WorkerError
 from tests.data.clusters import running_cluster
 from tests.data.plays import Play
 from tests.data.test_executor import squares

@@ -16,7 +16,6 @@ import pytest
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.data.playing.executor import WorkerError
 from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.record import record
@@ -26,6 +25,7 @@ from robot_layouts.experts.maniskill.pick_cube import pick_cube
 from robot_layouts.experts.rehearsal import Plan
 from tasks import TaskEnv
 from tasks.episode import play
+from tasks.processes.start import WorkerError
 from tests.data.plays import NO_PLAN, TASK, at_random
 from tests.data.test_recorder import same_files
 from tests.process_trees import workers_of

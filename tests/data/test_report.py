@@ -11,7 +11,8 @@ import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data.dataset.contents import chosen_places, measure, numbers_of, read_contents
 from robot_layouts.data.dataset.report import histogram, make_report
-from robot_layouts.data.playing.replay import open_recording, task_for
+from robot_layouts.data.playing.replay import open_recording
+from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RobotLayoutsError
 from tests.data.test_recorder import short_episode

@@ -12,7 +12,6 @@ import pytest
 
 from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate
-from robot_layouts.data.playing.executor import WorkerError
 from robot_layouts.data.receipts.receipt import Receipt, ReceiptError
 from robot_layouts.data.suite.run import (
     begin_run,
@@ -26,6 +25,7 @@ from robot_layouts.data.suite.run import (
 from robot_layouts.data.suite.suite import Case, Suite, load_suite, save_suite
 from robots import TaskError, UnknownNameError
 from tasks import Randomization
+from tasks.processes.start import WorkerError
 from tests.data.kills import Kill, Killed
 from tests.data.policies import TASK, Leans, fails, still
 

@@ -20,18 +20,20 @@ from robot_layouts.core.pages import plural
 from robot_layouts.core.schema import FieldError, Name, Object, check, exactly, length, whole
 from robot_layouts.core.writing import write_whole
 from robot_layouts.data.playing.environment import versions as installed
-from robot_layouts.data.playing.executor import Event, Executor, modules_of, play_all
+from robot_layouts.data.playing.executor import Executor, modules_of, play_all
 from robot_layouts.data.playing.replay import Replayed, open_recording, replay
+from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.seeds import checked_seeds
 from robot_layouts.data.reading.json_files import (
     MAX_JSON,
     MAX_SEED,
     MOST_EPISODES,
+    TrajectoryError,
     sized_file,
     spans_of,
 )
 from robot_layouts.data.reading.recorded_task import task_class, task_for
-from robot_layouts.data.reading.recording import Recording, TrajectoryError, all_files, first_file
+from robot_layouts.data.reading.recording import Recording, all_files, first_file
 from robot_layouts.experts.touching import ArmWatch
 from robots import RecordingError, UnreadableFileError
 from tasks import MultiRobotTask

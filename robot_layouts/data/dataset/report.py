@@ -31,8 +31,10 @@ from robot_layouts.data.dataset.contents import (
     read_contents,
 )
 from robot_layouts.data.playing.command_options import RecordingPath
-from robot_layouts.data.playing.replay import open_recording, task_for
-from robot_layouts.data.reading.recording import TrajectoryError, all_files, first_file
+from robot_layouts.data.playing.replay import open_recording
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import all_files, first_file
 from robot_layouts.data.video import video_problem
 from robots import RecordingError
 from robots.assets.progress import size

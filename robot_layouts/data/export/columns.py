@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.data.actors import EXPERT
-from robot_layouts.data.reading.recording import Recording, Trajectory, TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recording import Recording, Trajectory
 from robots import RobotDescriptor
 from tasks import TaskEnv
 from tasks.engine.columns import placed_bodies

@@ -29,8 +29,9 @@ from robot_layouts.data.playing.command_options import (
     stop_signals,
 )
 from robot_layouts.data.playing.executor import ProcessExecutor
+from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_class, task_for
-from robot_layouts.data.reading.recording import Recording, Trajectory, TrajectoryError
+from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.data.recording.disk import claim
 from robots import MissingPackageError, RecordingError, TaskError, UnknownNameError
 from tasks.description import instruction_of
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
     from robot_layouts.data.playing.executor import Executor
 FORMATS = ("lerobot", "robomimic")
 INSTALL = "pip install 'robot-layouts[export]'"
-
-__all__ = ["FORMATS", "Export", "Exported", "export"]
 
 Progress = Callable[[float, int], None]
 Draw = Callable[[Columns], "Drawing | DrawnEpisode | None"]

@@ -15,9 +15,10 @@ from layouts import Layout
 from layouts.placement import RobotLike
 from robot_layouts.data.export.columns import ColumnReader, Columns, state_row
 from robot_layouts.data.export.shots import RGB, Frame, Picture, PictureChannel, Shots
-from robot_layouts.data.playing.executor import Executor, modules_of, play_all, report
+from robot_layouts.data.playing.executor import Executor, modules_of, play_all
+from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.video import INSTALL
 from robot_layouts.simulation import Simulation
 from robot_layouts.simulation.rendering.pictures import SIZE, Cameras, Observers, vulkan_problem
@@ -25,6 +26,7 @@ from robots import MissingPackageError, SimulationError
 from tasks import MultiRobotTask, TaskEnv
 from tasks.engine.columns import OVERVIEW
 from tasks.episode import States, moments, open_loop
+from tasks.processes.worker import report
 
 SHAPE = (SIZE, SIZE, 3)  # of the overview
 

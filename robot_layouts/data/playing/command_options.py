@@ -19,7 +19,8 @@ from tasks.cell_options import RecordedCell
 
 if TYPE_CHECKING:
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.playing.executor import Event, Executor
+    from robot_layouts.data.playing.executor import Executor
+    from robot_layouts.data.playing.scheduler import Event
     from robot_layouts.data.reading.recording import Recording
 
 INTERRUPTED = 130  # exit code, as shells have it

@@ -14,15 +14,15 @@ import torch
 from numpy.typing import NDArray
 
 from robot_layouts.data.playing.environment import environment
-from robot_layouts.data.playing.executor import Event, Executor, modules_of, play_all
+from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.together import (
-    Cast,
-    Casting,
+    EpisodesJob,
+    EpisodesPlay,
     one_by_one,
     play_together,
     states_together,
 )
-from tasks import MultiRobotTask, Scenario
 from tasks.episode import Score, States
 
 BYTES = 2  # of the digest that are kept of each moment
@@ -82,43 +82,23 @@ class TracedScore(Score):
 
 
 @dataclass(frozen=True)
-class EvaluationJob:
-    """Everything but the seed that decides an episode; can be pickled.
+class EvaluationJob(EpisodesJob):
+    """Episodes whose scores count.
 
     Attributes:
-        task: Class of the task.
-        scenario: How to make it.
-        cast: Who plays.
-        together: Seeds that are played at once, by the first of them.
         traced: Whether each score is to be a `TracedScore`.
         most_steps: Seed → steps after which its episode ends, if it has not ended before.
     """
 
-    task: type[MultiRobotTask]
-    scenario: Scenario
-    cast: Cast
-    together: Mapping[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
     traced: bool = False
     most_steps: Mapping[int, int] = field(default_factory=dict[int, int])
 
-    @property
-    def modules(self) -> tuple[str, ...]:
-        """What other machines may need to play it."""
-        return modules_of(self.task, *self.cast.members)
-
     def __call__(self) -> Callable[[int], dict[int, Score]]:
         """Make the task in a worker, and return what plays the episodes of a seed and others."""
-        torch.set_num_threads(1)  # as many everywhere, so that sums are the same
         return _Play(self)
 
 
-class _Play:
-    """Plays episodes in the worlds of one task, which are built anew for each."""
-
-    def __init__(self, job: EvaluationJob) -> None:
-        self._job, self._env = job, job.task(job.scenario)
-        self._casting = Casting(job.cast, self._env)
-
+class _Play(EpisodesPlay[EvaluationJob]):
     def __call__(self, seed: int) -> dict[int, Score]:
         """Play the episodes of a seed and of those that are played together with it."""
         players = [self._casting(seed) for seed in self._job.together[seed]]
@@ -135,11 +115,6 @@ class _Play:
             )
             for player, states in zip(players, played, strict=True)
         }
-
-    def close(self) -> None:
-        """Let the worlds go."""
-        self._env.close()
-        self._casting.close()
 
 
 def scores_of(

@@ -15,28 +15,12 @@ from robot_layouts.data.playing.scheduler import (
     Play,
     RetryPolicy,
     Scheduler,
-    WorkerError,
-    WorkersDied,
     check_count,
 )
 from robots import TaskError
+from tasks.processes.start import WorkerError
 from tasks.processes.transport import packed
-from tasks.processes.worker import Pool, Reply, Worker, report
-
-__all__ = [
-    "DEATHS_ALLOWED",
-    "EPISODE_SECONDS",
-    "Event",
-    "Executor",
-    "Play",
-    "ProcessExecutor",
-    "WorkerError",
-    "WorkersDied",
-    "choose_executor",
-    "modules_of",
-    "play_all",
-    "report",
-]
+from tasks.processes.worker import Pool, Reply, Worker
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
 

@@ -25,9 +25,9 @@ from robot_layouts.data.playing.scheduler import (
     Play,
     RetryPolicy,
     Scheduler,
-    WorkerError,
     check_count,
 )
+from tasks.processes.start import WorkerError
 from tasks.processes.transport import SentError, loaded, unsendable
 from tasks.processes.worker import Reply, Status
 

@@ -12,9 +12,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.provenance import STATES
-from robot_layouts.data.reading.recorded_task import task_class, task_for
-from robot_layouts.data.reading.recording import FILE, Recording, Trajectory, TrajectoryError
+from robot_layouts.data.reading.recorded_task import task_class
+from robot_layouts.data.reading.recording import Recording, Trajectory
 from robots import TaskError
 from tasks import TaskEnv, get_task_class
 from tasks.episode import PlayedEpisode, States, play
@@ -23,17 +24,6 @@ COLUMNS = ("rewards", "success", "terminated", "truncated")
 DRAWN = "drawn"
 Start = Literal["seed", "state"]
 STARTS: tuple[Start, ...] = ("seed", "state")
-
-__all__ = [
-    "FILE",
-    "STARTS",
-    "Replayed",
-    "Start",
-    "find_official",
-    "open_recording",
-    "replay",
-    "task_for",
-]
 
 
 @dataclass(frozen=True)

@@ -13,17 +13,6 @@ from robots import TaskError
 from tasks.processes.start import WorkerError
 from tasks.processes.worker import Reply, Status
 
-__all__ = [
-    "WorkerBackend",
-    "Event",
-    "Play",
-    "RetryPolicy",
-    "Scheduler",
-    "SeedWorker",
-    "WorkerError",
-    "WorkersDied",
-]
-
 DEATHS_ALLOWED = 3  # of workers at one seed
 EPISODE_SECONDS = 600.0  # some hundred times what our slowest expert takes
 START_SECONDS = 600.0  # to load torch and SAPIEN from a busy disk, fetch robot files, build worlds

@@ -11,20 +11,21 @@ from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from math import fsum
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
 from robot_layouts.data.actors import EXPERT, check_policy, find_policy, is_person
+from robot_layouts.data.playing.executor import modules_of
 from robot_layouts.data.playing.in_process import random_states, seed_all, set_random_states
 from robot_layouts.data.playing.mode_conversion import Planner
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.registry import Expert
 from robots import ActionError, TaskError
-from tasks import MultiRobotTask, TaskEnv
+from tasks import MultiRobotTask, Scenario, TaskEnv
 from tasks.engine.actions import ActionReader
 from tasks.episode import REBUILT, Moment, PlayedEpisode, Policy, Score, States, open_loop
 
@@ -413,3 +414,43 @@ def _ends_at_last(episode: PlayedEpisode) -> bool:
 def _fresh(policy: Any) -> Any:
     """Return a copy of a policy as it was passed; people and what is batched are not copied."""
     return policy if is_batched(policy) or is_person(policy) else deepcopy(policy)
+
+
+@dataclass(frozen=True)
+class EpisodesJob:
+    """Everything but the seed that decides episodes of one task; can be pickled.
+
+    Attributes:
+        task: Class of the task.
+        scenario: How to make it.
+        cast: Who plays.
+        together: Seeds that are played at once, by the first of them.
+    """
+
+    task: type[MultiRobotTask]
+    scenario: Scenario
+    cast: Cast
+    together: Mapping[int, tuple[int, ...]]
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """What other machines may need to play it."""
+        return modules_of(self.task, *self.cast.members)
+
+
+AnyJob = TypeVar("AnyJob", bound=EpisodesJob)
+
+
+class EpisodesPlay(Generic[AnyJob]):
+    """Plays the episodes of a job in a worker, in worlds that are built anew for each."""
+
+    def __init__(self, job: AnyJob) -> None:
+        """Make the task."""
+        torch.set_num_threads(1)  # sums are the same everywhere, and other workers want the cores
+        self._job, self._env = job, job.task(job.scenario)
+        self._casting = Casting(job.cast, self._env)
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._env.close()
+        self._casting.close()

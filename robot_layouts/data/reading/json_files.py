@@ -11,8 +11,9 @@ import errno
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -381,8 +382,7 @@ def read_manifest(path: Path) -> RecordingManifest | None:
     """
     place = manifest_path(path)
     try:
-        found = read_json(place, MAX_JSON)
-        check(found, _Manifest, "")
+        found = check(read_json(place, MAX_JSON), _Manifest, "")
         return RecordingManifest(
             found["task"], found["header"], tuple(_entries(path, found["files"]))
         )
@@ -407,7 +407,7 @@ def manifest_text(manifest: RecordingManifest, path: Path) -> str:
     return json.dumps(about, indent=1) + "\n"
 
 
-def sized_file(path: Path) -> Sized:
+def sized_file(path: str | PathLike[str]) -> Sized:
     """Return the size and checksum of a file.
 
     Raises:
@@ -455,22 +455,16 @@ def _entries(path: Path, files: list[Mapping[str, Any]]) -> Iterable[FileEntry]:
         if sum(last - first + 1 for first, last in spans) != file["episodes"]:
             raise FieldError(f"files[{number}].seeds are not those of so many episodes")
         yield FileEntry(
-            Sized(**{name: file["h5"][name] for name in ("bytes", "sha256")}),
-            Sized(**{name: file["json"][name] for name in ("bytes", "sha256")}),
-            episodes=file["episodes"],
-            successes=file["successes"],
-            steps=file["steps"],
-            spans=spans,
+            Sized(**file["h5"]),
+            Sized(**file["json"]),
+            file["episodes"],
+            file["successes"],
+            file["steps"],
+            spans,
         )
 
 
 def _described(entry: FileEntry, name: str) -> dict[str, Any]:
-    return {
-        "file": name,
-        "h5": vars(entry.h5),
-        "json": vars(entry.json),
-        "episodes": entry.episodes,
-        "successes": entry.successes,
-        "steps": entry.steps,
-        "seeds": [list(span) for span in entry.spans],
-    }
+    about = asdict(entry)
+    seeds = about.pop("spans")
+    return {"file": name, **about, "seeds": seeds}

@@ -49,8 +49,6 @@ from tasks import TaskEnv
 from tasks.episode import States
 from tasks.native.controllers import CONTROLLER
 
-__all__ = ["Recording", "Trajectory", "TrajectoryError", "all_files", "expect_file", "first_file"]
-
 FILE = "trajectory.h5"
 
 _FLAGS = ("success", "terminated", "truncated")

@@ -17,8 +17,8 @@ from robot_layouts.core.commands import printable
 from robot_layouts.core.progress import Progress
 from robot_layouts.data.playing.command_options import ControlMode, RecordingOption
 from robot_layouts.data.playing.mode_conversion import converted_steps, why_lost
-from robot_layouts.data.playing.replay import FILE, task_for
-from robot_layouts.data.reading.recording import Recording, Trajectory
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import FILE, Recording, Trajectory
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError
 from tasks.episode import PlayedEpisode, play

@@ -36,7 +36,6 @@ from robot_layouts.data.reading.json_files import (
     spans_of,
 )
 from robot_layouts.data.reading.provenance import (
-    describe_layout,
     describe_task,
     header_differences,
     header_hash,
@@ -65,8 +64,6 @@ from robot_layouts.data.recording.episode_files import (
 from robots import RecordingError, TaskError, UnreadableFileError
 from tasks import TaskEnv
 from tasks.episode import PlayedEpisode
-
-__all__ = ["FILE_SIZE", "Recorder", "describe_layout"]
 
 
 @dataclass

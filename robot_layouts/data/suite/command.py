@@ -13,7 +13,7 @@ from robot_layouts.data.playing.command_options import GOES_ON, Players, stoppab
 
 if TYPE_CHECKING:
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.playing.executor import Event
+    from robot_layouts.data.playing.scheduler import Event
     from robot_layouts.data.suite.suite import Case
 
 SuiteName = Annotated[str, Word("SUITE")]
