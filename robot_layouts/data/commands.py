@@ -67,7 +67,7 @@ def teleop(
 
     import tasks
     from robot_layouts.data.actors import find_policy
-    from robot_layouts.data.recording.record import FILE
+    from robot_layouts.data.reading.recording import FILE
     from robot_layouts.data.recording.recorder import Recorder
     from robot_layouts.data.teleop.page import serve
     from robot_layouts.data.teleop.session import Session

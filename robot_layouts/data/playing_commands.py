@@ -80,7 +80,8 @@ def record(
         RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
     """
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.recording import record as recording
+    from robot_layouts.data.reading.recording import FILE
+    from robot_layouts.data.recording.record import record as recorded
     from tasks.processes.start import WorkerError
 
     executor, line = players.executor(), Progress(episodes, "episodes")
@@ -103,7 +104,7 @@ def record(
 
     try:
         with stoppable(lambda: f"stopped; {kept}; the same command goes on from there"), line:
-            summary = recording.record(
+            summary = recorded(
                 task,
                 range(seed, seed + episodes),
                 out,
@@ -115,7 +116,7 @@ def record(
     except (RecordingError, WorkerError):
         print(f"stopped; {kept}", file=sys.stderr)
         raise
-    _report(summary, out / recording.FILE)
+    _report(summary, out / FILE)
     return 1 if summary.failed else 0
 
 

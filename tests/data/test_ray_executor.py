@@ -18,9 +18,9 @@ from robot_layouts.data import evaluate
 from robot_layouts.data.playing.ray_cluster import gather_code
 from robot_layouts.data.playing.ray_executor import RayExecutor
 from robot_layouts.data.playing.scheduler import WorkersDied
-from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.receipts import verify
-from robot_layouts.data.recording.record import FILE, record
+from robot_layouts.data.recording.record import record
 from robot_layouts.experts import registry
 from robots import MissingPackageError, TaskError, UnknownNameError
 from tasks.processes.start import WorkerError

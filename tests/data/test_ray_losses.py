@@ -17,7 +17,7 @@ import pytest
 import robot_layouts.data.playing.ray_cluster
 import robot_layouts.data.playing.scheduler
 from robot_layouts.data.playing.ray_executor import RayExecutor
-from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.reading.recording import FILE
 from robots import TaskError
 from tasks.processes.start import WorkerError
 from tests.data.clusters import running_cluster

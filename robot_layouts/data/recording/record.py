@@ -41,6 +41,7 @@ from robot_layouts.data.playing.together import (
 )
 from robot_layouts.data.reading.json_files import FILE_SIZE
 from robot_layouts.data.reading.provenance import describe_layout, differences, listing
+from robot_layouts.data.reading.recording import FILE
 from robot_layouts.data.recording.episode_files import PartEncoder
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts import find_expert
@@ -52,7 +53,6 @@ from tasks.processes.transport import as_ours
 from tasks.registry import make_scenario
 from tasks.varying.randomization import Randomization
 
-FILE = "trajectory.h5"
 _TYPES = {EXPERT: "scripted", POLICY: "policy", PERSON: "human"}
 LOST_IN_A_ROW = 10  # episodes that workers died of, and none that was played, until all ends
 
