@@ -173,7 +173,7 @@ def _checksum(policy: Any) -> str | None:
         if file is None or not Path(file).is_file():
             return None
     try:
-        return sized_file(file).sha256
+        return sized_file(file)["sha256"]
     except (TypeError, ValueError, OSError, UnreadableFileError) as error:
         raise RecordingError(
             f"the file {file!r} of the policy {name_of(policy)} cannot be read: {error}"

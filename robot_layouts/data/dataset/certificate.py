@@ -164,7 +164,7 @@ class RecordingCertificate:
             "versions": self.versions,
             "files": self.files,
             "episodes": self.episodes,
-            "checked": [list(span) for span in spans_of(sorted(self.checked))],
+            "checked": spans_of(sorted(self.checked)),
             "equal": self.equal,
             "steps": self.steps,
             "successes": self.successes,
@@ -410,15 +410,13 @@ def _files(path: Path, file: Recording) -> list[dict[str, Any]]:
         sized = {"h5": sized_file(h5), "json": sized_file(beside)}
         if file.manifest is not None:
             entry = file.manifest.files[number]
-            if (entry.h5, entry.json) != (sized["h5"], sized["json"]):
+            if (entry["h5"], entry["json"]) != (sized["h5"], sized["json"]):
                 raise TrajectoryError(
                     f"{h5} or its json was changed after it was recorded: its checksum is not that"
                     " of the manifest; resume the recording once, which records damaged episodes"
                     " again"
                 )
-        found += [
-            {"file": p.name, **vars(s)} for p, s in ((h5, sized["h5"]), (beside, sized["json"]))
-        ]
+        found += [{"file": p.name, **s} for p, s in ((h5, sized["h5"]), (beside, sized["json"]))]
     return found
 
 

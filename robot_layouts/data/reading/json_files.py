@@ -11,7 +11,7 @@ import errno
 import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 from os import PathLike
 from pathlib import Path
@@ -52,8 +52,6 @@ _BLOCK = 2**20  # bytes
 
 _Count = Annotated[int, whole(0, MAX_SEED + 1)]
 _Bytes = Annotated[int, whole(0, 2**53)]
-
-Span = tuple[int, int]  # first and last of a range of seeds
 
 
 class _Reset(TypedDict, total=False):
@@ -286,15 +284,29 @@ def _modes(mode: str | Mapping[str, str] | None) -> set[str]:
     return {mode} if isinstance(mode, str) else set(mode.values())
 
 
-class _Sized(TypedDict):
+class Sized(TypedDict):
+    """A file's size (bytes) and its SHA-256."""
+
     bytes: _Bytes
     sha256: Digest
 
 
-class _File(TypedDict):
+class FileEntry(TypedDict):
+    """What a manifest says about one of a recording's files.
+
+    Attributes:
+        file: The name of its h5 file.
+        h5: That file.
+        json: The json beside it.
+        episodes: How many episodes it holds.
+        successes: How many of them ended in success.
+        steps: Control steps of all of them.
+        seeds: Their seeds, ascending, as ranges: the first and the last of each.
+    """
+
     file: Name
-    h5: _Sized
-    json: _Sized
+    h5: Sized
+    json: Sized
     episodes: _Count
     successes: _Count
     steps: _Bytes
@@ -305,48 +317,7 @@ class _Manifest(TypedDict):
     format: Annotated[str, exactly(FORMAT)]
     task: Name
     header: Digest
-    files: list[_File]
-
-
-@dataclass(frozen=True)
-class Sized:
-    """A file's size (bytes) and its SHA-256."""
-
-    bytes: int
-    sha256: str
-
-
-@dataclass(frozen=True)
-class FileEntry:
-    """What a manifest says about one of a recording's files.
-
-    Attributes:
-        h5: Its h5 file.
-        json: The json beside that.
-        episodes: How many episodes it holds.
-        successes: How many of them ended in success.
-        steps: Control steps of all of them.
-        spans: Their seeds, ascending, as ranges.
-    """
-
-    h5: Sized
-    json: Sized
-    episodes: int
-    successes: int
-    steps: int
-    spans: tuple[Span, ...]
-
-    @property
-    def seeds(self) -> list[int]:
-        """The seeds of its episodes, in their order."""
-        return [seed for first, last in self.spans for seed in range(first, last + 1)]
-
-    def matches(self, path: Path) -> bool:
-        """Tell whether an h5 file and its json are those that are meant, to the last byte."""
-        return all(
-            is_file_of(one, sized.bytes) and sized_file(one) == sized
-            for one, sized in ((path.with_suffix(".json"), self.json), (path, self.h5))
-        )
+    files: list[FileEntry]
 
 
 @dataclass(frozen=True)
@@ -361,7 +332,7 @@ class RecordingManifest:
 
     task_id: str
     header: str
-    files: tuple[FileEntry, ...]
+    files: list[FileEntry]
 
 
 def manifest_path(path: Path) -> Path:
@@ -383,9 +354,8 @@ def read_manifest(path: Path) -> RecordingManifest | None:
     place = manifest_path(path)
     try:
         found = check(read_json(place, MAX_JSON), _Manifest, "")
-        return RecordingManifest(
-            found["task"], found["header"], tuple(_entries(path, found["files"]))
-        )
+        _expect_entries(path, found["files"])
+        return RecordingManifest(found["task"], found["header"], found["files"])
     except UnreadableFileError as error:
         if error.errno == errno.ENOENT:
             return None
@@ -394,9 +364,9 @@ def read_manifest(path: Path) -> RecordingManifest | None:
         raise TrajectoryError(f"{place} is no manifest of a recording: {error}") from error
 
 
-def manifest_text(manifest: RecordingManifest, path: Path) -> str:
-    """Return what is written of a manifest, given the first h5 file."""
-    files = [_described(entry, file_path(path, i).name) for i, entry in enumerate(manifest.files)]
+def manifest_text(manifest: RecordingManifest) -> str:
+    """Return what is written of a manifest."""
+    files = manifest.files
     about = {
         "format": FORMAT,
         "task": manifest.task_id,
@@ -405,6 +375,20 @@ def manifest_text(manifest: RecordingManifest, path: Path) -> str:
         "files": files,
     }
     return json.dumps(about, indent=1) + "\n"
+
+
+def seeds_of(entry: FileEntry) -> list[int]:
+    """Return the seeds of a file's episodes, in their order."""
+    return [seed for first, last in entry["seeds"] for seed in range(first, last + 1)]
+
+
+def matches(entry: FileEntry, path: Path) -> bool:
+    """Tell whether an h5 file and its json are those that are meant, to the last byte."""
+    pairs = (path.with_suffix(".json"), entry["json"]), (path, entry["h5"])
+    return all(
+        one.is_file() and one.stat().st_size == sized["bytes"] and sized_file(one) == sized
+        for one, sized in pairs
+    )
 
 
 def sized_file(path: str | PathLike[str]) -> Sized:
@@ -418,25 +402,22 @@ def sized_file(path: str | PathLike[str]) -> Sized:
         while block := file.read(_BLOCK):
             digest.update(block)
             count += len(block)
-    return Sized(count, digest.hexdigest())
+    return Sized(bytes=count, sha256=digest.hexdigest())
 
 
-def is_file_of(path: Path, size: int) -> bool:
-    """Tell whether there is a file of so many bytes."""
-    return path.is_file() and path.stat().st_size == size
+def spans_of(seeds: Iterable[int]) -> list[list[int]]:
+    """Return ascending seeds as ranges: the first and the last of each."""
+    spans: list[list[int]] = []
+    for seed in seeds:
+        if spans and seed == spans[-1][1] + 1:
+            spans[-1][1] = seed
+        else:
+            spans.append([seed, seed])
+    return spans
 
 
-def spans_of(seeds: Iterable[int]) -> tuple[Span, ...]:
-    """Return ascending seeds as ranges."""
-    listed = list(seeds)
-    if not listed:
-        return ()
-    breaks = [i for i, (a, b) in enumerate(pairwise(listed), 1) if b != a + 1]
-    bounds = pairwise([0, *breaks, len(listed)])
-    return tuple((listed[first], listed[last - 1]) for first, last in bounds)
-
-
-def _entries(path: Path, files: list[Mapping[str, Any]]) -> Iterable[FileEntry]:
+def _expect_entries(path: Path, files: list[FileEntry]) -> None:
+    """Refuse files that are not those of a recording, or too many."""
     if len(files) > MOST_FILES:
         raise FieldError(f"it lists {len(files)} files; {MOST_FILES} are the most")
     if (count := sum(file["episodes"] for file in files)) > MOST_EPISODES:
@@ -447,24 +428,9 @@ def _entries(path: Path, files: list[Mapping[str, Any]]) -> Iterable[FileEntry]:
                 f"files[{number}].file is {file['file']!r}; it must be"
                 f" {file_path(path, number).name!r}"
             )
-        spans = tuple((first, last) for first, last in file["seeds"])
-        bounds = [bound for span in spans for bound in span]
-        apart = all(a < b for (_, a), (b, _) in pairwise(spans))
+        bounds = [bound for span in file["seeds"] for bound in span]
+        apart = all(a < b for (_, a), (b, _) in pairwise(file["seeds"]))
         if bounds != sorted(bounds) or not apart:
             raise FieldError(f"files[{number}].seeds are not ascending ranges")
-        if sum(last - first + 1 for first, last in spans) != file["episodes"]:
+        if sum(last - first + 1 for first, last in file["seeds"]) != file["episodes"]:
             raise FieldError(f"files[{number}].seeds are not those of so many episodes")
-        yield FileEntry(
-            Sized(**file["h5"]),
-            Sized(**file["json"]),
-            file["episodes"],
-            file["successes"],
-            file["steps"],
-            spans,
-        )
-
-
-def _described(entry: FileEntry, name: str) -> dict[str, Any]:
-    about = asdict(entry)
-    seeds = about.pop("spans")
-    return {"file": name, **about, "seeds": seeds}

@@ -27,6 +27,7 @@ from robot_layouts.data.reading.json_files import (
     manifest_path,
     read_manifest,
     read_summary,
+    seeds_of,
 )
 from robot_layouts.data.reading.provenance import (
     ARRAYS,
@@ -157,8 +158,8 @@ class Recording(Sequence[Trajectory]):
         self.seeds, counts = first.seeds, [len(first.entries)]
         if self.manifest is not None:
             self._expect_listed(0, first)
-            self.seeds = tuple(seed for file in self.manifest.files for seed in file.seeds)
-            counts = [file.episodes for file in self.manifest.files]
+            self.seeds = tuple(seed for file in self.manifest.files for seed in seeds_of(file))
+            counts = [file["episodes"] for file in self.manifest.files]
         self._starts = [0, *accumulate(counts)]
 
     def __enter__(self) -> Recording:
@@ -293,7 +294,7 @@ class Recording(Sequence[Trajectory]):
     def _expect_listed(self, number: int, file: _File) -> None:
         """Refuse a file with other episodes than the manifest says."""
         assert self.manifest is not None  # one file alone has no others
-        if list(file.seeds) != self.manifest.files[number].seeds:
+        if list(file.seeds) != seeds_of(self.manifest.files[number]):
             file.hdf5.close()
             raise TrajectoryError(
                 f"{file.path} does not hold the episodes that {manifest_path(self.path)} lists;"

@@ -316,7 +316,7 @@ def _module_checksum(name: str) -> str | None:
     """Return the SHA-256 of a module that is imported; None of one without a file of its own."""
     file = getattr(sys.modules.get(name), "__file__", None)
     try:
-        return None if file is None else sized_file(file).sha256
+        return None if file is None else sized_file(file)["sha256"]
     except UnreadableFileError:  # inside an archive
         return None
 
@@ -327,7 +327,7 @@ def _files(policy: Any) -> dict[str, str]:
     try:
         paths = [Path(path).absolute() for path in [*([] if one is None else [one]), *several]]
         folder = os.path.commonpath([path.parent for path in paths]) if paths else ""
-        return {path.relative_to(folder).as_posix(): sized_file(path).sha256 for path in paths}
+        return {path.relative_to(folder).as_posix(): sized_file(path)["sha256"] for path in paths}
     except (TypeError, ValueError, UnreadableFileError) as error:
         raise ReceiptError(
             f"the policy {name_of(policy)} names files that cannot be read: {error}; its attribute"

@@ -31,7 +31,9 @@ from robot_layouts.data.reading.json_files import (
     file_path,
     manifest_path,
     manifest_text,
+    matches,
     read_manifest,
+    seeds_of,
     sized_file,
     spans_of,
 )
@@ -129,9 +131,9 @@ class JoinedFiles:
             entry = self._listed[number] if number < len(self._listed) else None
             if number + 1 == len(self.paths):
                 self.last = self._read_all(number, path, entry)
-            elif entry is not None and entry.matches(path):
+            elif entry is not None and matches(entry, path):
                 self._entries.append(entry)
-                self._note_seeds(path, entry.seeds)
+                self._note_seeds(path, seeds_of(entry))
             else:
                 self._reopen(number, path, entry)
         if self._entries:
@@ -142,7 +144,7 @@ class JoinedFiles:
         for path in (self.manifest, *self.paths, self._path):
             path.with_suffix(".json").unlink(missing_ok=True)
             path.unlink(missing_ok=True)
-        self._listed, self.paths = (), []
+        self._listed, self.paths = [], []
 
     def write(
         self,
@@ -176,12 +178,13 @@ class JoinedFiles:
         _write_if_other(path.with_suffix(".json"), text)
         self.seeds.update(places)
         entry = FileEntry(
-            sized_file(path),
-            sized_file(path.with_suffix(".json")),
-            len(abouts),
-            sum(bool(about["success"]) for about in abouts),
-            sum(about["elapsed_steps"] for about in abouts),
-            spans_of(file.episodes),
+            file=path.name,
+            h5=sized_file(path),
+            json=sized_file(path.with_suffix(".json")),
+            episodes=len(abouts),
+            successes=sum(bool(about["success"]) for about in abouts),
+            steps=sum(about["elapsed_steps"] for about in abouts),
+            seeds=spans_of(file.episodes),
         )
         if last:
             self._last_entry = entry if file.number else None
@@ -199,10 +202,10 @@ class JoinedFiles:
         if not self._entries:
             self.manifest.unlink(missing_ok=True)
             return
-        entries = (*self._entries, *([self._last_entry] if self._last_entry else []))
+        entries = [*self._entries, *([self._last_entry] if self._last_entry else [])]
         task_id = self._header["env_info"]["env_id"]
         manifest = RecordingManifest(task_id, header_hash(self._header), entries)
-        _write_if_other(self.manifest, manifest_text(manifest, self._path))
+        _write_if_other(self.manifest, manifest_text(manifest))
 
     def write_empty(self) -> None:
         """Write the last file without episodes; none if there are others.
@@ -232,13 +235,13 @@ class JoinedFiles:
             for seed in seeds:
                 yield seed, read_joined_episode(opened, file.episodes[seed].group)
 
-    def _read_manifest(self) -> tuple[FileEntry, ...]:
+    def _read_manifest(self) -> list[FileEntry]:
         try:
             manifest = read_manifest(self._path)
         except TrajectoryError:  # the files are read in its place, and it is written anew
-            return ()
+            return []
         if manifest is None or manifest.header != header_hash(self._header):
-            return ()
+            return []
         return manifest.files
 
     def _find(self) -> list[Path]:
@@ -257,7 +260,7 @@ class JoinedFiles:
 
     def _read_all(self, number: int, path: Path, entry: FileEntry | None) -> OpenFile:
         """Read all of a file."""
-        listed = frozenset(entry.seeds if entry else ())
+        listed = frozenset(seeds_of(entry) if entry else ())
         if not path.exists():
             self.damaged.append(f"{path} with its {len(listed)} episodes, which is gone,")
             return OpenFile(number, lost=listed)
