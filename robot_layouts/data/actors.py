@@ -87,7 +87,7 @@ class Actor:
 
 
 def actor_of(policy: Any, name: str | None = None) -> Actor:
-    """Return who a policy is, or somebody who takes over.
+    """Return who a policy is, or a person who takes over.
 
     Args:
         policy: What gives actions. It may say by its attribute ``actor`` who it is, an `Actor`, or

@@ -138,7 +138,7 @@ def test_who_plays():
     assert players(None, {"PushT-v1": STILL, "others": "expert"}) == [STILL, "expert"]
     assert players("expert", {"others": STILL}) == ["expert", "expert"]
     assert players({"push_t": STILL, "pick_cube": fails}) == [STILL, fails]
-    with pytest.raises(TaskError, match="nobody plays PickCube-v1; name its policy, or one for 'o"):
+    with pytest.raises(TaskError, match="PickCube-v1 has no policy; name one, or one for 'o"):
         players({"PushT-v1": STILL})
     with pytest.raises(TaskError, match="the policy of PushT-v1 is given twice"):
         players({"PushT-v1": STILL, "push_t": STILL})

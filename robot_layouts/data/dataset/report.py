@@ -59,7 +59,7 @@ def histogram(
 
     Args:
         values: One for each episode, (n,) with n of 1 or more.
-        failed: Whether it ended without success, (n,); None if nobody says.
+        failed: Whether it ended without success, (n,); None if that is unknown.
         label: What is counted, in words.
         show: Writes a value at the axis.
     """
@@ -183,7 +183,7 @@ def _tiles(report: DatasetReport) -> list[Tile]:
         Tile("on disk", f"{contents.megabytes:,.1f} MB", plural(len(contents.files), "file")),
     ]
     if c is None:
-        tiles.append(Tile("certified", "–", "nobody has replayed it"))
+        tiles.append(Tile("certified", "–", "not replayed"))
     else:
         kind = "good" if c.holds else "bad"
         equal = f"{c.equal:,} of {c.episodes:,}"

@@ -317,7 +317,7 @@ class _Work:
         self._instruction = instruction_of(task.task_class)
 
     def text(self, trajectory: Trajectory) -> str | None:
-        """Return what is to be done in an episode; None if nobody says so or asks.
+        """Return what is to be done in an episode; None if no text is given.
 
         The task's own is given with pictures alone, as robomimic datasets of old held none.
         """

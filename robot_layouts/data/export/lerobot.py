@@ -120,7 +120,7 @@ class LeRobotWriter(DatasetWriter):
     ) -> dict[str, tuple[dict[str, Any], Number]]:
         """Return description and values, (T, k), of every feature that is no picture.
 
-        A row holds the state before a step, the step's action, and what came of it.
+        A row holds the state before a step, the step's action, and its result.
         """
         steps = len(columns)
         frames = np.arange(steps)

@@ -342,7 +342,7 @@ def _read(array: Any) -> NDArray[Any]:
     """Return the numbers of an array.
 
     Raises:
-        ContentError: If a chunk of it unpacks to more than it declares, or a flag is none.
+        ContentError: If a chunk of it unpacks to more than it declares, or a flag is not 0 or 1.
     """
     flags = _PYFIVE.check_enum_dtype(array.dtype) is not None
     if not _bytes_of(array):

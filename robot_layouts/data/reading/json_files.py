@@ -349,7 +349,7 @@ def read_manifest(path: Path) -> RecordingManifest | None:
     """Return the manifest of a recording, given its first h5 file; None if it has none.
 
     Raises:
-        TrajectoryError: If it cannot be read, or is none.
+        TrajectoryError: If it cannot be read, or is no manifest.
     """
     place = manifest_path(path)
     try:

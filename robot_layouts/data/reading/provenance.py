@@ -339,7 +339,7 @@ def describe_guessed(layout: Layout) -> dict[str, dict[str, str]]:
 def guess_again(place: str, recorded: Mapping[str, str], name: str) -> RobotDescriptor:
     """Return the robot of a recording, guessed from the same file.
 
-    The file is parsed only if it has the recorded checksum, so that a recording of somebody else
+    The file is parsed only if it has the recorded checksum, so that another person's recording
     makes nothing of other files. A xacro template is not expanded: it is a program.
 
     Args:

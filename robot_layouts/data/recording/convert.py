@@ -8,9 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from robot_layouts.core.cli import Folder
 from robot_layouts.core.commands import printable
@@ -18,15 +16,15 @@ from robot_layouts.core.progress import Progress
 from robot_layouts.data.playing.command_options import ControlMode, RecordingOption
 from robot_layouts.data.playing.mode_conversion import converted_steps, why_lost
 from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.reading.recording import FILE, Recording, Trajectory
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError
-from tasks.episode import PlayedEpisode, play
+from tasks.episode import play
 
 
 @dataclass
 class Conversion:
-    """What came of converting a recording.
+    """The result of converting a recording.
 
     Attributes:
         path: Where it is.
@@ -70,7 +68,7 @@ def convert(
 ) -> Conversion:
     """Record the successful episodes of a recording in another control mode.
 
-    Who acted is kept; what a corrector would have done is not, as nobody played it.
+    Who acted is kept; what a corrector would have done is not, as it was not played.
 
     Args:
         file: The recording.
@@ -83,7 +81,7 @@ def convert(
 
     Raises:
         TrajectoryError: If the recording cannot be played here.
-        TaskError: If the mode is none.
+        TaskError: If there is no such mode.
         RecordingError: If the folder cannot be written or holds a recording of something else.
     """
     with closing(task_for(file, **(cell or {}))) as source:
@@ -111,7 +109,8 @@ def convert(
                     actions, steps = converted_steps(source, episode.seed, episode.actions, task)
                     played = play(task, episode.seed, actions)
                     if played.solved:
-                        recorder.add(_signed(played, episode, steps))
+                        actor = None if episode.actor is None else episode.actor[steps]
+                        recorder.add(replace(played, source=episode.source, actor=actor))
                         found.kept.append(episode.seed)
                     else:
                         found.lost.append(episode.seed)
@@ -120,18 +119,6 @@ def convert(
                         )
                 on_episode()
     return found
-
-
-def _signed(played: PlayedEpisode, episode: Trajectory, steps: NDArray[np.intp]) -> PlayedEpisode:
-    """Write into an episode who acted in the one that it was made from.
-
-    Args:
-        played: The episode.
-        episode: The one that it was made from.
-        steps: Which step of that each of its own stands for.
-    """
-    actor = None if episode.actor is None else episode.actor[steps]
-    return replace(played, source=episode.source, actor=actor)
 
 
 def convert_command(

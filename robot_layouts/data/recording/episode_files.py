@@ -192,7 +192,7 @@ def list_parts(folder: Path) -> list[Path]:
 
 
 def refuse_foreign(folder: Path) -> None:
-    """Refuse a folder of parts that holds something else, which nobody should delete.
+    """Refuse a folder of parts that holds something else, which must not be deleted.
 
     Raises:
         RecordingError: If so.
@@ -426,7 +426,7 @@ def read_joined_episode(file: Hdf5File, name: str) -> Stored:
     """Read an episode that was written here.
 
     Raises:
-        ValueError: If its checksum is another, or it is none.
+        ValueError: If its checksum is another, or it is no episode.
     """
     attributes, arrays = file.texts(name) or {}, file.numbers(name)
     own = attributes.pop(CHECKSUM, None)  # an earlier version wrote none

@@ -84,7 +84,7 @@ class Actors:
 
         Raises:
             TaskError: If the task has no expert, something cannot be imported or called, or
-                somebody is to take over from an expert, who does not look.
+                there is a takeover for an expert, whose plan ignores observations.
             RecordingError: If a policy's file cannot be read.
         """
         if isinstance(policy, str) and policy == EXPERT:
@@ -186,7 +186,7 @@ class _Play(EpisodesPlay[EpisodeJob]):
 
 @dataclass
 class Summary:
-    """What came of a recording.
+    """The result of a recording.
 
     Attributes:
         recorded: Episodes in the file in the end.

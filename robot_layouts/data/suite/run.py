@@ -335,7 +335,7 @@ def chosen_policies(suite: Suite, cases: Sequence[Case], given: Any = None) -> d
         task = get_task_class(case.task).task_id
         policy = by_task.get(task, by_task.get(OTHERS))
         if policy is None:
-            raise TaskError(f"nobody plays {task}; name its policy, or one for {OTHERS!r}")
+            raise TaskError(f"{task} has no policy; name one, or one for {OTHERS!r}")
         if policy == EXPERT:
             find_expert(task)  # refuses a task that has none
         found[case.name] = policy
