@@ -342,9 +342,9 @@ def test_threads_that_play_in_this_process_take_turns():
 
 @pytest.mark.parametrize("workers", [-1, True, 2.5, "2", float("nan"), [1]])
 def test_no_number_of_workers(workers):
-    with pytest.raises(TaskError, match="workers is .*; it must be a whole number, 0 or more"):
+    with pytest.raises(TaskError, match="workers is .*; it must be an integer of 0 or more"):
         choose_executor(workers)
-    with pytest.raises(TaskError, match="workers is .*; it must be a whole number, 1 or more"):
+    with pytest.raises(TaskError, match="workers is .*; it must be an integer of 1 or more"):
         ProcessExecutor(workers)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
 from typing import Any, Protocol
 
+from robot_layouts.core.bounds import checked_whole
 from robot_layouts.data.playing.scheduler import (
     DEATHS_ALLOWED,
     EPISODE_SECONDS,
@@ -15,7 +16,6 @@ from robot_layouts.data.playing.scheduler import (
     Play,
     RetryPolicy,
     Scheduler,
-    check_count,
 )
 from robots import TaskError
 from tasks.processes.start import WorkerError
@@ -74,7 +74,7 @@ class ProcessExecutor:
             TaskError: If a number is not valid.
         """
         if workers is not None:
-            check_count("workers", workers, 1)
+            checked_whole("workers", workers, 1, None, TaskError)
         self.workers = len(os.sched_getaffinity(0)) if workers is None else workers
         self._policy = RetryPolicy(attempts, fresh, episode_timeout)
 
@@ -127,7 +127,7 @@ def choose_executor(
         TaskError: If a number is not valid, or contradicts the executor.
     """
     if workers is not None:
-        check_count("workers", workers, 0)
+        checked_whole("workers", workers, 0, None, TaskError)
     limited = episode_timeout != EPISODE_SECONDS
     if executor is not None:
         if workers is not None or limited:

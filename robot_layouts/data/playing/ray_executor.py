@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from robot_layouts.core.bounds import checked_whole
 from robot_layouts.data.playing.environment import versions
 from robot_layouts.data.playing.ray_cluster import (
     RayCluster,
@@ -25,8 +26,8 @@ from robot_layouts.data.playing.scheduler import (
     Play,
     RetryPolicy,
     Scheduler,
-    check_count,
 )
+from robots import TaskError
 from tasks.processes.start import WorkerError
 from tasks.processes.transport import SentError, loaded, unsendable
 from tasks.processes.worker import Reply, Status
@@ -76,7 +77,7 @@ class RayExecutor:
         self._ray = import_ray()
         check_address(address)
         if workers is not None:
-            check_count("workers on a Ray cluster", workers, 1)
+            checked_whole("workers on a Ray cluster", workers, 1, None, TaskError)
         self._address, self._workers, self._modules = address, workers, tuple(modules)
         self._policy = RetryPolicy(attempts, fresh, episode_timeout)
 

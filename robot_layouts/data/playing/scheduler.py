@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
+from robot_layouts.core.bounds import checked_whole
 from robots import TaskError
 from tasks.processes.start import WorkerError
 from tasks.processes.worker import Reply, Status
@@ -140,18 +141,8 @@ class RetryPolicy:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        check_count("attempts", self.attempts, 1)
+        checked_whole("attempts", self.attempts, 1, None, TaskError)
         check_timeout(self.episode_timeout)
-
-
-def check_count(name: str, value: object, least: int) -> None:
-    """Refuse what is no whole number, or too small.
-
-    Raises:
-        TaskError: If it is.
-    """
-    if not isinstance(value, int) or isinstance(value, bool) or value < least:
-        raise TaskError(f"{name} is {value!r}; it must be a whole number, {least} or more")
 
 
 def check_timeout(value: float | None) -> None:
