@@ -47,16 +47,6 @@ from tasks.episode import Score
 from tasks.varying.randomization import Randomization
 
 _MOST = 10**6
-_AS_THEY_ARE = (
-    "obs_mode",
-    "reward_mode",
-    "control_mode",
-    "control_frequency",
-    "max_episode_steps",
-    "bystanders",
-    "simulator",
-)  # arguments of the same name
-
 _MAIN = "__main__"  # a script or a notebook, which cannot be imported
 _VARIABLE = re.compile(r"""\b(?:environ(?:\.get\(|\[)|getenv\()\s*["'](\w+)["']""")
 
@@ -142,14 +132,14 @@ def make_again(
         ReceiptError: If it is invalid, or a robot is not available here.
     """
     try:
-        check(dict(making), _Making, "making")
+        arguments = check(dict(making), _Making, "making")
+        arguments.pop("num_envs", None)
         check(dict(guessed), GUESSED, "guessed")
         layout = layout_again(making["layout"], guessed, cls.layout, robots, "the receipt")
         physics, varied = making["physics"], making["randomization"]
         size = making["camera_size"]
-        chosen = {name: making[name] for name in _AS_THEY_ARE}
         return {
-            **chosen,
+            **arguments,
             "layout": cls.layout if same_layout(layout, cls.layout) else layout,
             "physics": None if physics is None else _physics(physics),
             "randomization": None if varied is None else Randomization.from_json(varied),

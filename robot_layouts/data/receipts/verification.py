@@ -13,12 +13,13 @@ from typing import Any
 
 from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.playing.evaluation_job import EvaluationJob, scores_of
 from robot_layouts.data.playing.executor import Executor, choose_executor
 from robot_layouts.data.playing.replay import first_row
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.together import cast_of, grouped
-from robot_layouts.data.receipts.provenance import EXPERT, describe_job, make_again, receipt_of
+from robot_layouts.data.receipts.provenance import describe_job, make_again, receipt_of
 from robot_layouts.data.receipts.receipt import EpisodeReceipt, Receipt, ReceiptError
 from robots import RobotLayoutsError
 from tasks import MultiRobotTask, get_task_class
