@@ -124,7 +124,7 @@ def test_every_value_of_the_json_is_looked_at(path, where, value, why):
     ("layout", "why"),
     [
         ([1], r"layout is \[1\]; it must be an object"),
-        ({"arm": {"robot": "panda"}}, "it has no layout\['arm'\].position"),
+        ({"arm": {"robot": "panda"}}, r"it has no layout\['arm'\].position"),
         ("[" * 100_000, "attribute layout: its json nests deeper"),
     ],
 )
