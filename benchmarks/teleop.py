@@ -25,9 +25,8 @@ import tasks
 from benchmarks.records import versions_of, write_record
 from layouts.viewer.server import ViewerError
 from robot_layouts.data.teleop.page import GIZMO_SIZE
-from robot_layouts.data.teleop.picture import FIELD_OF_VIEW, viewpoint
 from robot_layouts.data.teleop.session import Session
-from robot_layouts.data.teleop.stopwatch import HTML_ID, MOST, QUICK
+from robot_layouts.data.teleop.widgets import FIELD_OF_VIEW, HTML_ID, MOST, QUICK, viewpoint
 from robot_layouts.kinematics.rotations import Floats, rotate
 from robots import MissingPackageError, TaskError
 

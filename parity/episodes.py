@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import tasks
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
-from robot_layouts.data.reading.summary import recorded_task
+from robot_layouts.data.reading.json_files import TrajectoryError, recorded_task
+from robot_layouts.data.reading.recording import Recording
 from robot_layouts.experts import find_expert
 from robots import CONTROL_MODES, TaskError
 from tasks import MultiRobotTask

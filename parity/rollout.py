@@ -26,7 +26,7 @@ from parity.native import native_agents
 from parity.results import number_text, versions
 from parity.scene import NativeScene
 from robot_layouts.core.writing import written_whole
-from robot_layouts.data.reading.recording import TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.video import open_video
 from tasks import MultiRobotTask, TaskEnv
 from tasks.episode import Episode

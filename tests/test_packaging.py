@@ -154,7 +154,6 @@ class TestDependencies:
 LOADED_WITH_ITS_EXTRA = {
     "robot_layouts/data/export/lerobot.py",
     "robot_layouts/data/export/lerobot_files.py",
-    "robot_layouts/data/export/lerobot_pictures.py",
     "tasks/interfaces/parallel.py",
     "tasks/interfaces/sb3.py",
 }

@@ -23,7 +23,7 @@ from robot_layouts.kinematics.rotations import (
 )
 from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
-from robots.urdf.model import Inertial, ModelJoint, UrdfModel
+from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import parse_urdf, read_urdf
 from robots.urdf.tcp import find_tcp
@@ -73,19 +73,19 @@ class RobotSource:
     drawn: bool
 
     @cached_property
-    def inertials(self) -> dict[str, Inertial]:
+    def inertials(self) -> dict[str, LinkInertia]:
         """Masses and inertias by link, along its axes; those that shapes give are left out."""
-        found: dict[str, Inertial] = {}
+        found: dict[str, LinkInertia] = {}
         moved = {joint.child for joint in self.model.moving}
         for link in self.model.links:
             own = self.model.inertials.get(link)
             if own is not None and own.mass != 0 and np.diag(own.tensor).any():
                 origin, turn = np.eye(4), own.origin[:3, :3]
                 origin[:3, 3] = own.origin[:3, 3]
-                found[link] = Inertial(own.mass, origin, turn @ own.tensor @ turn.T)
+                found[link] = LinkInertia(own.mass, origin, turn @ own.tensor @ turn.T)
             elif link in moved and link not in self.model.collisions:
                 tensor = SMALLEST_INERTIA * np.eye(3)
-                found[link] = Inertial(SMALLEST_INERTIA, np.eye(4), tensor)
+                found[link] = LinkInertia(SMALLEST_INERTIA, np.eye(4), tensor)
         return found
 
     @cached_property

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
-from robot_layouts.core.writing import PARTIAL, remove, written_whole
+from robot_layouts.core.writing import written_whole
 from robots import LayoutError, RobotDescriptor, UrdfLocator
 from robots.assets.assembled import AssembledUrdf
 from robots.assets.manifest import load_manifest
@@ -52,20 +51,18 @@ def replaced_folder(folder: Path, is_own: Callable[[Path], bool], advice: str) -
         LayoutError: If the folder holds something else, which would be lost.
         UnwritableFileError: If it cannot be written.
     """
-    there = sorted(folder.iterdir()) if folder.is_dir() else []
-    strange = [found.name for found in there if not is_own(found)]
+    strange: list[str] = []
+    with suppress(FileNotFoundError):  # none, or another export is just replacing it
+        if folder.is_dir():
+            strange = [found.name for found in sorted(folder.iterdir()) if not is_own(found)]
     if strange:
         raise LayoutError(
             f"{folder} would be replaced, but holds {', '.join(strange)}, which no export of a"
             f" layout leaves; move it, or {advice}"
         )
-    with written_whole(folder) as made:
+    with written_whole(folder, over=True) as made:
         made.mkdir(parents=True)
         yield made
-        old = made.with_name(f"{made.name.removesuffix(PARTIAL)}.old{PARTIAL}")
-        if folder.is_dir():
-            os.replace(folder, old)
-    remove(old)
 
 
 def licence_note(robots: Iterable[RobotDescriptor]) -> str:

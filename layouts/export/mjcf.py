@@ -19,7 +19,7 @@ from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robots import CameraMount, LayoutError
-from robots.urdf.model import Inertial, ModelJoint
+from robots.urdf.model import LinkInertia, ModelJoint
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
@@ -312,7 +312,7 @@ def _least_inertia(joint: ModelJoint, source: RobotSource) -> float:
     return sum(max(0.0, float(np.linalg.eigvalsh(inertial.tensor)[0])) for inertial in own)
 
 
-def _inertial(inertial: Inertial) -> dict[str, str]:
+def _inertial(inertial: LinkInertia) -> dict[str, str]:
     full = inertial.tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     return {
         "pos": _text(inertial.origin[:3, 3].tolist()),

@@ -11,13 +11,13 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots import LayoutError, RobotDescriptor
+from robots.assets.assembled import rename
 from robots.bodies.allowed import joined_pairs, read_allowed_pairs
 from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import parse_urdf, read_urdf
-from robots.urdf.text import rename
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement

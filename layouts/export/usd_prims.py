@@ -12,7 +12,7 @@ from layouts.export.cell import RobotSource
 from layouts.export.meshes import CollisionShape, Drawn
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, quaternion_of
 from robots import CameraMount, GripperMaterial, MissingPackageError
-from robots.urdf.model import Inertial, ModelJoint
+from robots.urdf.model import LinkInertia, ModelJoint
 
 # From a camera that looks along +x, z up, to USD's, which looks along -z, y up (wxyz).
 LOOKING = (0.5, 0.5, -0.5, -0.5)
@@ -112,7 +112,7 @@ def add_box(stage: Any, path: str, pose: Floats, size: Floats) -> None:
     UsdPhysics.CollisionAPI.Apply(made.GetPrim())
 
 
-def set_inertia(prim: Any, inertial: Inertial) -> None:
+def set_inertia(prim: Any, inertial: LinkInertia) -> None:
     """Give a link mass and inertia."""
     Gf, UsdPhysics = usd_modules("Gf", "UsdPhysics")
 

@@ -26,6 +26,7 @@ def written_whole(
     partial: Path | None = None,
     parents: bool = True,
     sync: bool = False,
+    over: bool = False,
 ) -> Generator[Path]:
     """Give a path beside the target to write to; it takes the target's place at the end.
 
@@ -39,6 +40,7 @@ def written_whole(
             uses.
         parents: Whether to make the folder that it is in.
         sync: Whether to wait until a file is on the disk before it takes the target's place.
+        over: Whether a folder may also take the place of one that holds something.
 
     Raises:
         RobotLayoutsError: The given error, if it cannot be written.
@@ -55,10 +57,12 @@ def written_whole(
             yield partial
             if sync:
                 _sync(partial)
-            os.replace(partial, target)
+            replaced = _replace(partial, target, over)
         except BaseException:
             remove(partial)
             raise
+    for folder in replaced:
+        remove(folder)
 
 
 def write_whole(
@@ -110,6 +114,26 @@ def remove(path: Path) -> None:
 
 def _beside(target: Path) -> Path:
     return target.with_name(f"{target.name}.{os.getpid()}.{next(_numbers)}{PARTIAL}")
+
+
+def _replace(partial: Path, target: Path, over: bool) -> list[Path]:
+    """Put a file or folder in its place, which others may replace at the same moment.
+
+    Returns:
+        Where the folders are now that were in its place.
+    """
+    aside: list[Path] = []
+    while True:
+        try:
+            os.replace(partial, target)
+            return aside
+        except OSError as refusal:
+            is_link = target.is_symlink() and target.is_dir()
+            if not over or not (is_link or refusal.errno in (errno.ENOTEMPTY, errno.EEXIST)):
+                raise
+        with suppress(FileNotFoundError):  # another one has just moved it
+            os.replace(target, old := _beside(target))
+            aside.append(old)
 
 
 def _make_parent(target: Path) -> None:

@@ -1,27 +1,24 @@
-"""Commands that play, show, convert or export what is recorded, and record by hand."""
+"""Commands that play and show what is recorded, and record by hand."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from layouts.commands import Page, Server
-from robot_layouts.core.cli import Count, Folder, Natural, Seed, Word
-from robot_layouts.core.commands import UsageError, printable
+from robot_layouts.core.cli import Folder, Seed
+from robot_layouts.core.commands import printable
 from robot_layouts.core.pages import plural
 from robot_layouts.data.playing.command_options import (
     ControlMode,
-    PictureSize,
-    Players,
     Policy,
     RecordingOption,
     RecordingPath,
     stop_signals,
 )
-from robots import RecordingError, TaskError
-from robots.assets.progress import size
+from robots import TaskError
 from tasks.cell_options import Cell
 
 if TYPE_CHECKING:
@@ -34,36 +31,6 @@ if TYPE_CHECKING:
     from tasks import TaskEnv
 
 TELEOP_FOLDER = Path("runs/teleop")
-
-
-def demo(
-    *,
-    task: str = "TwoRobotPickCube-v1",
-    seeds: Count = 10,
-    out: Folder = Path("runs/demo"),
-    no_video: bool = False,
-    cell: Cell,
-) -> int:
-    """Let an expert play a task, and keep a recording, a picture and a video.
-
-    Exit code: 0 if every seed was solved, 1 if not, 2 for bad usage.
-
-    Args:
-        task: Id of the task.
-        seeds: Play seeds 0 to N - 1.
-        out: Folder of the results.
-        no_video: Make no video.
-        cell: The task's robots, and what varies.
-
-    Raises:
-        RobotLayoutsError: If the task cannot be made, or has no expert.
-    """
-    from rich.console import Console
-
-    from robot_layouts.data.demo import DemoOptions, run_demo
-
-    chosen = DemoOptions(task, seeds, out, video=not no_video, making=cell.making())
-    return 0 if run_demo(chosen, Console()) else 1
 
 
 def teleop(
@@ -99,9 +66,9 @@ def teleop(
     import_viser()
 
     import tasks
-    from robot_layouts.data.recording.record import FILE
+    from robot_layouts.data.actors import find_policy
+    from robot_layouts.data.reading.recording import FILE
     from robot_layouts.data.recording.recorder import Recorder
-    from robot_layouts.data.sources.policies import find_policy
     from robot_layouts.data.teleop.page import serve
     from robot_layouts.data.teleop.session import Session
 
@@ -121,178 +88,6 @@ def teleop(
             pass
         kept, total = len(session.kept), len(recorder)
         print(f"{folder / FILE}: {plural(total, 'episode')}, {kept} of them new")
-
-
-def convert(
-    recording: RecordingOption, *, to: ControlMode, out: Folder, episodes: int | None = None
-) -> int:
-    """Record the episodes of a recording again in another control mode.
-
-    Each episode is played in its own mode and in the other, and kept if it succeeds there too.
-    Those that did not succeed when they were recorded are left out. Exit code: 0 if all others were
-    kept, 1 if not, 2 for bad usage.
-
-    Args:
-        recording: The recording.
-        to: The other mode.
-        out: Folder of trajectory.h5 and .json.
-        episodes: Convert the first N episodes (all).
-
-    Raises:
-        RobotLayoutsError: If the recording cannot be played or the other not be written.
-    """
-    import torch
-
-    from robot_layouts.core.progress import Progress
-    from robot_layouts.data.recording import convert as converting
-
-    torch.set_num_threads(1)
-    with recording.open() as file:
-        count = _first(episodes, file)
-        if not count:
-            raise RecordingError(f"{file.path} has no episodes to convert")
-        with Progress(count, "episodes") as line:
-            summary = converting.convert(
-                file,
-                to,
-                out,
-                count,
-                recording.cell.making(),
-                lambda: line.advance(1, "converting"),
-            )
-    print(printable(str(summary)))
-    return 0 if summary.complete else 1
-
-
-def export(
-    recording: RecordingPath,
-    *,
-    format: Annotated[str, Word("FORMAT")],
-    out: Folder,
-    fps: int | None = None,
-    video: bool = False,
-    cameras: Sequence[Annotated[str, Word("NAME")]] | None = None,
-    images: bool = False,
-    depth: bool = False,
-    size: PictureSize | None = None,
-    instruction: Annotated[str, Word("TEXT")] | None = None,
-    include_failures: bool = False,
-    only_successes: bool = False,
-    task: str | None = None,
-    players: Players,
-) -> None:
-    """Write a recording as a dataset for LeRobot or robomimic.
-
-    The dataset appears when it is complete. Exit code: 0 if it was written, 1 if not, 2 for bad
-    usage.
-
-    Args:
-        recording: An h5 file, or a recording's folder.
-        format: Format of the dataset: lerobot or robomimic.
-        out: New folder for the dataset.
-        fps: Steps per second to state (default: the task's, 20).
-        video: Draw every step as well (lerobot; needs Vulkan).
-        cameras: Draw what these cameras see, as videos (lerobot) or arrays (robomimic): all,
-            overview, or by place: base_camera, left.hand_camera.
-        images: Write png images, which lose nothing, in place of videos.
-        depth: Write the cameras' depth as well (mm, 16 bits).
-        size: Width and height of the pictures in pixels (each camera's own).
-        instruction: What the policy is to do, in words (the task's own).
-        include_failures: Export episodes without success, too.
-        only_successes: What happens anyway.
-        task: The recording's task; MODULE:ID for one of your own.
-        players: Who plays.
-
-    Raises:
-        RobotLayoutsError: If the export fails; see `robot_layouts.data.export.dataset`.
-    """
-    from robot_layouts.core.progress import Progress
-    from robot_layouts.data.export import dataset
-
-    if include_failures and only_successes:
-        raise UsageError("--include-failures and --only-successes contradict each other")
-    wanted = dataset.Export(
-        recording,
-        format,
-        out,
-        fps=fps,
-        video=video,
-        include_failures=include_failures,
-        task=task,
-        cameras=cameras,
-        images=images,
-        depth=depth,
-        size=size,
-        instruction=instruction,
-    )
-    in_process = players.workers == 0 and players.ray is None
-    executor = None if in_process else players.executor()
-    with Progress(unit="episodes") as line, stop_signals():
-
-        def show(done: float, total: int) -> None:
-            line.total = total
-            line.update(round(done, 1), f"exporting {recording.name}")
-
-        done = dataset.export(wanted, show, executor=executor, tell=line.say)
-    left_out = ""
-    if done.left_out:
-        failures = plural(done.left_out, "episode")
-        left_out = f"; left out: {failures} without success (--include-failures exports them)"
-    print(f"{done.folder}: {plural(done.episodes, 'episode')}, {done.steps} steps{left_out}")
-
-
-def report(
-    file: RecordingPath,
-    *,
-    out: Annotated[Path, Word("PAGE")],
-    clearances: Natural = 100,
-    clips: Natural = 4,
-    task: str | None = None,
-    cell: Cell,
-) -> None:
-    """Write one HTML page on a data set: counts, lengths, sources, variations, clips.
-
-    The page needs nothing else, and loads nothing. A certificate beside the recording is shown.
-    Exit code: 0 if the page was written, 1 if not, 2 for bad usage.
-
-    Args:
-        file: The folder of a recording, or one h5 file.
-        out: The HTML file.
-        clearances: Measure in N episodes how near robots came; needs the extra checks.
-        clips: Film N episodes; needs Vulkan and the extra video.
-        task: The recording's task; MODULE:ID for one of your own.
-        cell: Which robots stood where, where the recording cannot say it.
-
-    Raises:
-        RobotLayoutsError: If the recording cannot be read, or the page not be written.
-    """
-    import torch
-
-    from robot_layouts.core.progress import Progress
-    from robot_layouts.core.writing import write_whole
-    from robot_layouts.data.dataset.page import render
-    from robot_layouts.data.dataset.report import make_report
-
-    torch.set_num_threads(1)
-    with Progress(unit="parts") as line:
-
-        def show(done: float, total: float, what: str) -> None:
-            line.total = total
-            line.update(done, what)
-
-        made = make_report(
-            file,
-            task_id=task,
-            cell=cell.making(),
-            clearances=clearances,
-            clips=clips,
-            progress=show,
-        )
-    page = render(made)
-    write_whole(out, page, RecordingError)
-    print(printable(f"{out}: {size(len(page.encode()))}"))
-    for remark in made.remarks:
-        print(printable(remark))
 
 
 def view(recording: RecordingOption, *, episode: int = 0, page: Page) -> None:
@@ -362,8 +157,8 @@ def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
     Raises:
         TrajectoryError: If there is no such episode, or it cannot be shown.
     """
-    from robot_layouts.data.playing.replay import task_for
-    from robot_layouts.data.reading.recording import TrajectoryError
+    from robot_layouts.data.reading.json_files import TrajectoryError
+    from robot_layouts.data.reading.recorded_task import task_for
     from tasks.view import task_cell
 
     if not 0 <= number < len(file):
@@ -381,7 +176,7 @@ def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
 
 def _motion(task: TaskEnv, trajectory: Trajectory) -> Motion:
     """Reset the task as the episode began, and return what happens in it."""
-    from robot_layouts.data.reading.recording import TrajectoryError
+    from robot_layouts.data.reading.json_files import TrajectoryError
     from tasks.episode import REBUILT, play
     from tasks.view import recorded_motion
 
@@ -420,12 +215,13 @@ def replay(
     from rich.console import Console
 
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.playing.replay import replay, task_for
+    from robot_layouts.data.playing.replay import replay
+    from robot_layouts.data.reading.recorded_task import task_for
 
     torch.set_num_threads(1)
     with recording.open() as file:
         task = task_for(file, **recording.cell.making())
-        count = _first(episodes, file)
+        count = recording.count(file, episodes)
         found: list[Replayed] = []
         with Progress(count, "episodes") as line:
             for number in range(count):
@@ -439,11 +235,6 @@ def replay(
     for sentence in _sentences(found, from_):
         console.print(sentence, soft_wrap=True)
     return 0 if found and all(episode.agrees for episode in found) else 1
-
-
-def _first(episodes: int | None, file: Recording) -> int:
-    """Return how many episodes of a file are asked for and there."""
-    return len(file) if episodes is None else max(0, min(episodes, len(file)))
 
 
 def _table(found: Sequence[Replayed]) -> Table:

@@ -16,6 +16,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 import tasks
 from layouts import Layout
+from robot_layouts.core.cli import Count, Folder
 from robot_layouts.core.pages import plural
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.data.video import film, video_problem
@@ -23,6 +24,7 @@ from robot_layouts.experts import find_expert
 from robot_layouts.experts.rehearsal import rehearsed
 from robots import AssetError, MissingPackageError, RecordingError, TaskError
 from tasks import TaskEnv
+from tasks.cell_options import Cell
 from tasks.episode import PlayedEpisode, Score, play
 from tasks.registry import make_scenario
 
@@ -184,3 +186,29 @@ def _film(options: DemoOptions, episodes: Sequence[PlayedEpisode], console: Cons
         )
     which = "the first episode" if shown == 1 else f"the first {shown} episodes"
     console.print(f"video     {escape(str(path))}, {which}", highlight=False)
+
+
+def demo(
+    *,
+    task: str = "TwoRobotPickCube-v1",
+    seeds: Count = 10,
+    out: Folder = Path("runs/demo"),
+    no_video: bool = False,
+    cell: Cell,
+) -> int:
+    """Let an expert play a task, and keep a recording, a picture and a video.
+
+    Exit code: 0 if every seed was solved, 1 if not, 2 for bad usage.
+
+    Args:
+        task: Id of the task.
+        seeds: Play seeds 0 to N - 1.
+        out: Folder of the results.
+        no_video: Make no video.
+        cell: The task's robots, and what varies.
+
+    Raises:
+        RobotLayoutsError: If the task cannot be made, or has no expert.
+    """
+    chosen = DemoOptions(task, seeds, out, video=not no_video, making=cell.making())
+    return 0 if run_demo(chosen, Console()) else 1

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.writing import writing_errors
-from robot_layouts.data.playing.casting import Cast, cast_of
+from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.playing.evaluation_job import EvaluationJob, scores_of
-from robot_layouts.data.playing.executor import EPISODE_SECONDS, Event, Executor, choose_executor
+from robot_layouts.data.playing.executor import Executor, choose_executor
+from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event
 from robot_layouts.data.playing.seeds import checked_seeds, seed_lines
-from robot_layouts.data.playing.together import grouped
+from robot_layouts.data.playing.together import Cast, cast_of, grouped
 from robot_layouts.data.receipts.provenance import describe_job, receipt_of
 from robot_layouts.data.receipts.receipt import Receipt
-from robot_layouts.data.sources.policies import EXPERT
 from robots import TaskError
 from tasks import get_task_class
 from tasks.episode import Policy, Score

@@ -115,7 +115,7 @@ class _Assembly:
                 continue
             for visual in [] if self._pictures else element.findall("visual"):
                 element.remove(visual)
-            _rename(element, lambda name: prefix + name, lambda name: self._file(name, path))
+            rename(element, lambda name: prefix + name, lambda name: self._file(name, path))
             self._expect_new(element, path)
             self._robot.append(element)
         return prefix + root
@@ -185,7 +185,7 @@ def _belongs(element: Element, links: frozenset[str], root: str) -> bool:
     return element.tag == "material" or (element.tag == "link" and element.get("name") in links)
 
 
-def _rename(element: Element, name: Callable[[str], str], file: Callable[[str], str]) -> None:
+def rename(element: Element, name: Callable[[str], str], file: Callable[[str], str]) -> None:
     """Give a link, joint or material, and what it refers to, other names."""
     names = [(element, "name"), *((part, "name") for part in element.iter("material"))]
     names += [(part, "link") for part in element if part.tag in ("parent", "child")]

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from robot_layouts.core.processes import worker
-from robot_layouts.data.playing.executor import Event, report
+from robot_layouts.core.processes.worker import report
+from robot_layouts.data.playing.scheduler import Event
 from robots import TaskError
 
 TASK = "PushT-v1"

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
-from robot_layouts.data.receipts.making import describe_making
+from robot_layouts.data.receipts.provenance import describe_making
 from robot_layouts.data.receipts.receipt import EpisodeReceipt, Receipt
-from robot_layouts.data.suite.folder import SuiteRun, begin_run, read_run, receipt_path
+from robot_layouts.data.suite.run import SuiteRun, begin_run, read_run, receipt_path
 from robot_layouts.data.suite.suite import Case, Suite
 from tasks import get_task_class
 from tasks.registry import make_scenario

@@ -10,11 +10,11 @@ import pytest
 import tasks
 from layouts import face_to_face
 from robot_layouts.__main__ import main
-from robot_layouts.data.dataset.certificate import Certificate, sentences
-from robot_layouts.data.dataset.certify import certify
-from robot_layouts.data.playing.comparison import first_difference
+from robot_layouts.data.dataset.certificate import RecordingCertificate, certify, sentences
 from robot_layouts.data.playing.in_process import InProcessExecutor
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.playing.replay import first_difference
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError
 from tasks.episode import play
@@ -167,4 +167,4 @@ def test_arms_that_touch_are_counted(tmp_path):
     assert found.touching == [{"seed": 0, "success": False, "steps": 3}]
     assert sentences(found)[1].endswith("; seeds 0 (no success)")
     assert all("left." in pair and "right." in pair for pair in found.pairs)
-    assert Certificate.read(path.with_suffix(".certificate.json")) == found
+    assert RecordingCertificate.read(path.with_suffix(".certificate.json")) == found

@@ -14,7 +14,8 @@ import tasks
 from layouts import Layout, Placement
 from robot_layouts.__main__ import main
 from robot_layouts.data.playing.mode_conversion import why_lost
-from robot_layouts.data.playing.replay import open_recording, replay, task_for
+from robot_layouts.data.playing.replay import open_recording, replay
+from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.recording.convert import Conversion
 from robot_layouts.data.recording.record import record
 from tests.data.recordings import edited

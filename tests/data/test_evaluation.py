@@ -14,8 +14,9 @@ import torch
 
 import tasks
 from robot_layouts.__main__ import main
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.data import Evaluation, Score, evaluate
-from robot_layouts.data.playing.executor import ProcessExecutor, WorkerError
+from robot_layouts.data.playing.executor import ProcessExecutor
 from robot_layouts.experts import find_expert, registry
 from robots import TaskError, UnknownNameError
 from tasks.episode import REBUILT, play
@@ -117,7 +118,7 @@ def test_a_policy_of_a_notebook():
 
 @pytest.mark.parametrize("workers", [-1, -10, True, 2.5, "2"])
 def test_no_number_of_workers(workers):
-    with pytest.raises(TaskError, match="workers is .*; it must be a whole number, 0 or more"):
+    with pytest.raises(TaskError, match="workers is .*; it must be an integer of 0 or more"):
         evaluate(still, TASK, [0], workers=workers)
 
 

@@ -7,6 +7,8 @@ import re
 import subprocess
 import sys
 import textwrap
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -14,16 +16,11 @@ import pytest
 import torch
 
 import robot_layouts.data.playing.scheduler
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.data.playing.command_options import Players
-from robot_layouts.data.playing.executor import (
-    Event,
-    ProcessExecutor,
-    WorkerError,
-    WorkersDied,
-    choose_executor,
-    play_all,
-)
+from robot_layouts.data.playing.executor import ProcessExecutor, choose_executor, play_all
 from robot_layouts.data.playing.in_process import InProcessExecutor
+from robot_layouts.data.playing.scheduler import Event, WorkersDied
 from robots import TaskError
 from tests.data.plays import (
     CannotBeLoaded,
@@ -326,11 +323,28 @@ def test_this_process_keeps_its_own_settings():
         torch.set_num_threads(threads)
 
 
+def test_threads_that_play_in_this_process_take_turns():
+    def play(seed):
+        random.seed(seed)
+        first = random.random()
+        time.sleep(0.001)
+        return first, random.random()
+
+    def draws(_):
+        return [event.result for event in InProcessExecutor().run(lambda: play, range(20))]
+
+    before = random.getstate()
+    with ThreadPoolExecutor(3) as pool:
+        alone, *others = pool.map(draws, range(3))
+    assert others == [alone] * 2
+    assert random.getstate() == before
+
+
 @pytest.mark.parametrize("workers", [-1, True, 2.5, "2", float("nan"), [1]])
 def test_no_number_of_workers(workers):
-    with pytest.raises(TaskError, match="workers is .*; it must be a whole number, 0 or more"):
+    with pytest.raises(TaskError, match="workers is .*; it must be an integer of 0 or more"):
         choose_executor(workers)
-    with pytest.raises(TaskError, match="workers is .*; it must be a whole number, 1 or more"):
+    with pytest.raises(TaskError, match="workers is .*; it must be an integer of 1 or more"):
         ProcessExecutor(workers)
 
 

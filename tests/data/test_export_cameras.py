@@ -16,11 +16,11 @@ import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data.export.columns import ColumnReader, state_row
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.export.drawing_job import DrawnEpisode, draw_in_order
-from robot_layouts.data.export.lerobot import LeRobotWriter, Limits
-from robot_layouts.data.export.pictures import Drawing
-from robot_layouts.data.export.shots import Channel, choose_shots
-from robot_layouts.data.playing.executor import Event, ProcessExecutor
+from robot_layouts.data.export.drawing import Drawing, DrawnEpisode, draw_in_order
+from robot_layouts.data.export.lerobot import FileLimits, LeRobotWriter
+from robot_layouts.data.export.shots import PictureChannel, choose_shots
+from robot_layouts.data.playing.executor import ProcessExecutor
+from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
@@ -209,8 +209,8 @@ def test_worlds_that_vary_are_drawn_as_they_were(tmp_path):
     assert drawing.exact
 
 
-def flat(camera: str, value: int, moments: int = 2) -> tuple[Channel, np.ndarray]:
-    return Channel(camera, "rgb", 16, 16), np.full((moments, 16, 16, 3), value, np.uint8)
+def flat(camera: str, value: int, moments: int = 2) -> tuple[PictureChannel, np.ndarray]:
+    return PictureChannel(camera, "rgb", 16, 16), np.full((moments, 16, 16, 3), value, np.uint8)
 
 
 class OutOfTurn:
@@ -228,7 +228,7 @@ class Job:
     """What a crew needs to know of a job whose workers do something else."""
 
     class shots:  # noqa: N801
-        channels = [Channel("a", "rgb", 16, 16)]
+        channels = [PictureChannel("a", "rgb", 16, 16)]
 
 
 def test_episodes_are_handed_out_in_their_order(tmp_path):
@@ -252,7 +252,7 @@ def test_full_video_files_are_followed_by_others(tmp_path):
     with Recording(path) as file:
         reader = ColumnReader(task_for(file))
         channels = [flat("a", 0)[0], flat("b", 0)[0]]
-        limits = Limits(video_megabytes=3 * 16 * 16 / 8 / 2**20)  # three frames
+        limits = FileLimits(video_megabytes=3 * 16 * 16 / 8 / 2**20)  # three frames
         with LeRobotWriter(
             tmp_path / "out", reader, task_text="go", fps=20, origin={}, channels=channels,
             limits=limits,
@@ -337,9 +337,9 @@ def test_cameras_are_chosen_by_place():
     assert [*choose_shots(two, ["all"]).cameras] == [*NATIVE]
     shots = choose_shots(two, ["right.hand_camera", "overview"], size=SIZE, depth=True)
     assert shots.channels == [
-        Channel("overview", "rgb", 512, 512),
-        Channel("right.hand_camera", "rgb", 32, 24),
-        Channel("right.hand_camera", "depth", 32, 24),
+        PictureChannel("overview", "rgb", 512, 512),
+        PictureChannel("right.hand_camera", "rgb", 32, 24),
+        PictureChannel("right.hand_camera", "depth", 32, 24),
     ]
     with pytest.raises(UnknownNameError, match="'left.hand_camera'") as refused:
         choose_shots(two, ["left.hand_camer"])
@@ -361,12 +361,12 @@ def test_names_that_cannot_be_told_apart_are_refused(name):
 
 
 def test_videos_have_even_sides(tmp_path):
-    from robot_layouts.data.export.lerobot_pictures import PictureWriter
+    from robot_layouts.data.export.lerobot_files import PictureWriter
 
-    channels = [Channel("a", "rgb", 15, 16)]
+    channels = [PictureChannel("a", "rgb", 15, 16)]
     with pytest.raises(TaskError, match="a have 15 × 16 pixels; videos need even numbers"):
-        PictureWriter(tmp_path, channels, 20, Limits(), images=False)
-    PictureWriter(tmp_path, channels, 20, Limits(), images=True)
+        PictureWriter(tmp_path, channels, 20, FileLimits(), images=False)
+    PictureWriter(tmp_path, channels, 20, FileLimits(), images=True)
 
 
 class Watched:

@@ -13,14 +13,15 @@ import numpy as np
 import pytest
 
 import robot_layouts.core.progress as progress
-import robot_layouts.data.export.pictures as pictures
+import robot_layouts.data.export.drawing as pictures
 import tasks
 from layouts import Layout, Placement
 from robot_layouts.__main__ import main
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.export.shots import choose_shots
-from robot_layouts.data.reading.recording import Recording, Trajectory, TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError, RobotRegistry, TaskError
 from robots.descriptor import ActionSplit

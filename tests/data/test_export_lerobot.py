@@ -13,7 +13,7 @@ import pytest
 import tasks
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.export.lerobot import LeRobotWriter, Limits
+from robot_layouts.data.export.lerobot import FileLimits, LeRobotWriter
 from robot_layouts.data.export.statistics import PictureStatistics
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
@@ -217,7 +217,7 @@ def test_picture_statistics_are_those_of_the_pixels():
 def test_full_files_are_followed_by_others(recording, tmp_path):
     with Recording(recording) as file:
         reader = ColumnReader(task_for(file))
-        limits = Limits(data_megabytes=1e-6, files=2)
+        limits = FileLimits(data_megabytes=1e-6, files=2)
         with LeRobotWriter(
             tmp_path, reader, task_text="go", fps=20, origin={}, limits=limits
         ) as writer:

@@ -10,7 +10,7 @@ import tasks
 from robot_layouts.data import evaluate
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.export.pictures import Drawing
+from robot_layouts.data.export.drawing import Drawing
 from robot_layouts.data.export.shots import choose_shots
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording

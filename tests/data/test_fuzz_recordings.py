@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 import tasks
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording.episode_files import read_part
-from robot_layouts.data.recording.joined_files import read_joined
+from robot_layouts.data.recording.episode_files import read_joined, read_part
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RobotLayoutsError
 from tasks.episode import play

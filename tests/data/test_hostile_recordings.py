@@ -16,7 +16,8 @@ import pytest
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.reading import hdf5
 from robot_layouts.data.reading.hdf5 import ContentError, Hdf5File, LimitError, limited
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recording import Recording
 from robots import UnreadableFileError
 from tests.data.recordings import edited, record
 
@@ -123,7 +124,7 @@ def test_every_value_of_the_json_is_looked_at(path, where, value, why):
     ("layout", "why"),
     [
         ([1], r"layout is \[1\]; it must be an object"),
-        ({"arm": {"robot": "panda"}}, "it has no layout\['arm'\].position"),
+        ({"arm": {"robot": "panda"}}, r"it has no layout\['arm'\].position"),
         ("[" * 100_000, "attribute layout: its json nests deeper"),
     ],
 )

@@ -9,9 +9,8 @@ import pytest
 
 from layouts import single
 from robot_layouts import __main__ as console
-from robot_layouts.data.suite.files import load_suite
-from robot_layouts.data.suite.folder import receipt_path
-from robot_layouts.data.suite.suite import Case, Suite
+from robot_layouts.data.suite.run import receipt_path
+from robot_layouts.data.suite.suite import Case, Suite, load_suite
 from robots import TaskError
 from tasks.registry import TASKS
 from tests.data.policies import TASK

@@ -13,14 +13,15 @@ import pytest
 import robot_layouts.data.playing.ray_executor
 import robot_layouts.data.playing.scheduler
 from robot_layouts.__main__ import main
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.rooms import PACKAGES
 from robot_layouts.data import evaluate
-from robot_layouts.data.playing.executor import WorkerError, WorkersDied
 from robot_layouts.data.playing.ray_cluster import gather_code
 from robot_layouts.data.playing.ray_executor import RayExecutor
-from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.playing.scheduler import WorkersDied
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.receipts import verify
-from robot_layouts.data.recording.record import FILE, record
+from robot_layouts.data.recording.record import record
 from robot_layouts.experts import registry
 from robots import MissingPackageError, TaskError, UnknownNameError
 from tests.data.clusters import Nodes, running_cluster

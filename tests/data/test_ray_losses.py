@@ -16,9 +16,9 @@ import pytest
 
 import robot_layouts.data.playing.ray_cluster
 import robot_layouts.data.playing.scheduler
-from robot_layouts.data.playing.executor import WorkerError
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.data.playing.ray_executor import RayExecutor
-from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.reading.recording import FILE
 from robots import TaskError
 from tests.data.clusters import running_cluster
 from tests.data.plays import Play

@@ -10,9 +10,10 @@ import pytest
 import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.playing.replay import open_recording, task_for
-from robot_layouts.data.reading.manifest import manifest_path
-from robot_layouts.data.reading.recording import Recording, TrajectoryError, all_files
+from robot_layouts.data.playing.replay import open_recording
+from robot_layouts.data.reading.json_files import TrajectoryError, manifest_path
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import Recording, all_files
 from robot_layouts.data.recording.recorder import Recorder
 from tests.data.test_recorder import short_episode
 

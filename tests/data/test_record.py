@@ -16,7 +16,7 @@ import pytest
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.data.playing.executor import WorkerError
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.record import record
@@ -251,7 +251,7 @@ def test_another_recording_is_not_gone_on_with(tmp_path, capsys):
         ),
         (["--ray=local"], 1, "'local' is no address of a Ray cluster; it must be"),
         (["--ray="], 1, "'' is no address of a Ray cluster; it must be"),
-        (["--ray=auto", "--workers=0"], 1, "workers on a Ray cluster is 0; it must be a whole nu"),
+        (["--ray=auto", "--workers=0"], 1, "workers on a Ray cluster is 0; it must be an integer"),
         (["--seed=-1"], 2, "-1 is too few; it must be 0 or more"),
         (["--control-mode=pd_ee_dance"], 1, "control_mode 'pd_ee_dance' is not offered"),
         (["--control-mode=left=,right="], 2, "makes no sense; a name such as"),

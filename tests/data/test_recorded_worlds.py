@@ -10,9 +10,10 @@ import pytest
 from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate, record
 from robot_layouts.data.playing.ray_executor import RayExecutor
-from robot_layouts.data.playing.replay import replay, task_for
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
-from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.playing.replay import replay
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import FILE, Recording
 from robots import RecordingError
 from tasks.randomization.declaration import AXES
 from tests.data.clusters import running_cluster

@@ -9,9 +9,11 @@ import pytest
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.data.playing.plan_conversion import as_positions
-from robot_layouts.data.playing.replay import find_official, open_recording, replay, task_for
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.playing.mode_conversion import as_positions
+from robot_layouts.data.playing.replay import find_official, open_recording, replay
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robots import UnknownNameError
 from tasks.episode import play

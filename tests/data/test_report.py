@@ -9,12 +9,10 @@ import pytest
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.data.dataset.charts import histogram
-from robot_layouts.data.dataset.clearance import measure
-from robot_layouts.data.dataset.clips import chosen_places
-from robot_layouts.data.dataset.contents import numbers_of, read_contents
-from robot_layouts.data.dataset.report import make_report
-from robot_layouts.data.playing.replay import open_recording, task_for
+from robot_layouts.data.dataset.contents import chosen_places, measure, numbers_of, read_contents
+from robot_layouts.data.dataset.report import histogram, make_report
+from robot_layouts.data.playing.replay import open_recording
+from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RobotLayoutsError
 from tests.data.test_recorder import short_episode

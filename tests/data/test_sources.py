@@ -13,12 +13,14 @@ import torch
 
 import tasks
 from robot_layouts.__main__ import main
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.data import evaluate, record
-from robot_layouts.data.playing.executor import WorkerError
-from robot_layouts.data.playing.replay import replay, task_for
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.actors import Actor, actor_of, episode_source
+from robot_layouts.data.playing.replay import replay
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
-from robot_layouts.data.sources.actors import Actor, actor_of, episode_source
 from robot_layouts.experts import registry
 from robots import RecordingError, TaskError
 from tasks.episode import play

@@ -10,9 +10,15 @@ import h5py
 import pytest
 
 import tasks
-from robot_layouts.data.reading.manifest import manifest_path, read_manifest, spans_of
+from robot_layouts.data.reading.json_files import (
+    manifest_path,
+    matches,
+    read_manifest,
+    seeds_of,
+    spans_of,
+)
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording import joined_files
+from robot_layouts.data.recording import recorder as recorders
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError, TaskError
 from tests.data.kills import Kill, Killed
@@ -67,8 +73,8 @@ def test_each_file_is_a_recording_by_itself(straight):
 def test_the_manifest_says_what_there_is(straight):
     manifest = read_manifest(straight)
     files = sorted(straight.parent.glob("*.h5"))
-    assert all(entry.matches(p) for entry, p in zip(manifest.files, files, strict=True))
-    assert [tuple(entry.seeds) for entry in manifest.files] == seeds_by_file(straight)
+    assert all(matches(entry, p) for entry, p in zip(manifest.files, files, strict=True))
+    assert [tuple(seeds_of(entry)) for entry in manifest.files] == seeds_by_file(straight)
     about = json.loads(manifest_path(straight).read_text())
     assert about["episodes"] == COUNT
     assert about["steps"] == sum(2 + seed % 3 for seed in range(COUNT))
@@ -128,8 +134,8 @@ def test_full_files_are_not_read_again(tmp_path, push_t, straight, monkeypatch):
         looked.append(file.name)
         return original(file)
 
-    original = joined_files.read_joined
-    monkeypatch.setattr(joined_files, "read_joined", read)
+    original = recorders.read_joined
+    monkeypatch.setattr(recorders, "read_joined", read)
     Recorder(path, env, resume=True, file_size=SIZE).close()
     assert looked == [sorted(p.name for p in path.parent.glob("*.h5"))[-1]]
     assert contents(path) == contents(straight)
@@ -158,7 +164,7 @@ def test_a_file_that_is_gone_is_recorded_again(tmp_path, push_t, straight):
     env, episodes = push_t
     path = copied(straight, tmp_path)
     gone = tmp_path / "trajectory_0001.h5"
-    lost = read_manifest(path).files[1].seeds
+    lost = seeds_of(read_manifest(path).files[1])
     gone.unlink()
     with Recorder(path, env, resume=True, file_size=SIZE) as recorder:
         assert "trajectory_0001.h5 with its" in recorder.damaged[0]
@@ -266,6 +272,6 @@ def test_a_size_that_makes_no_sense(tmp_path, push_t):
 
 
 def test_seeds_as_ranges():
-    assert spans_of([]) == ()
-    assert spans_of([3]) == ((3, 3),)
-    assert spans_of([0, 1, 2, 5, 7, 8]) == ((0, 2), (5, 5), (7, 8))
+    assert spans_of([]) == []
+    assert spans_of([3]) == [[3, 3]]
+    assert spans_of([0, 1, 2, 5, 7, 8]) == [[0, 2], [5, 5], [7, 8]]

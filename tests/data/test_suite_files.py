@@ -6,8 +6,15 @@ from pathlib import Path
 import pytest
 
 from layouts import Layout, face_to_face
-from robot_layouts.data.suite.files import SHIPPED, load_suite, save_suite
-from robot_layouts.data.suite.suite import Case, Suite, read_seeds, write_seeds
+from robot_layouts.data.suite.suite import (
+    SHIPPED,
+    Case,
+    Suite,
+    load_suite,
+    read_seeds,
+    save_suite,
+    write_seeds,
+)
 from robots import TaskError, UnknownNameError
 from tasks import Randomization
 from tasks.registry import CATALOGUE

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from robot_layouts.data.reading.guessed_robots import descriptor_digest
+from robot_layouts.data.reading.provenance import descriptor_digest
 from robot_layouts.data.receipts import Receipt
 from robot_layouts.data.receipts.provenance import describe_expert, describe_task
-from robot_layouts.data.suite.files import load_suite
-from robot_layouts.data.suite.folder import expect_untouched, read_run
-from robot_layouts.data.suite.page import read_runs, render_markdown
+from robot_layouts.data.suite.report import read_runs, render_markdown
+from robot_layouts.data.suite.run import expect_untouched, read_run
+from robot_layouts.data.suite.suite import load_suite
 from robot_layouts.experts import find_expert
 from robots import RobotRegistry
 from tasks import get_task_class

@@ -10,11 +10,19 @@ from markdown_it import MarkdownIt
 from layouts import single
 from robot_layouts.__main__ import main
 from robot_layouts.data.receipts.receipt import Receipt, ReceiptError
-from robot_layouts.data.suite.folder import receipt_path
-from robot_layouts.data.suite.page import read_runs, render_markdown, render_page
+from robot_layouts.data.suite.report import (
+    ALL,
+    comparisons,
+    failures,
+    lengths,
+    read_runs,
+    render_markdown,
+    render_page,
+    successes,
+)
 from robot_layouts.data.suite.results import compare, overall
+from robot_layouts.data.suite.run import receipt_path
 from robot_layouts.data.suite.suite import Case, Suite
-from robot_layouts.data.suite.tables import ALL, comparisons, failures, lengths, successes
 from robots import TaskError
 from tasks import Randomization
 from tests.data.suites import made_run, receipt

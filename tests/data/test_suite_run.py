@@ -11,13 +11,19 @@ from pathlib import Path
 import pytest
 
 from robot_layouts.__main__ import main
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.data import evaluate
-from robot_layouts.data.playing.executor import WorkerError
 from robot_layouts.data.receipts.receipt import Receipt, ReceiptError
-from robot_layouts.data.suite.files import load_suite, save_suite
-from robot_layouts.data.suite.folder import begin_run, read_run, receipt_path
-from robot_layouts.data.suite.run import chosen_cases, chosen_policies, run_suite, verify_run
-from robot_layouts.data.suite.suite import Case, Suite
+from robot_layouts.data.suite.run import (
+    begin_run,
+    chosen_cases,
+    chosen_policies,
+    read_run,
+    receipt_path,
+    run_suite,
+    verify_run,
+)
+from robot_layouts.data.suite.suite import Case, Suite, load_suite, save_suite
 from robots import TaskError, UnknownNameError
 from tasks import Randomization
 from tests.data.kills import Kill, Killed
@@ -132,7 +138,7 @@ def test_who_plays():
     assert players(None, {"PushT-v1": STILL, "others": "expert"}) == [STILL, "expert"]
     assert players("expert", {"others": STILL}) == ["expert", "expert"]
     assert players({"push_t": STILL, "pick_cube": fails}) == [STILL, fails]
-    with pytest.raises(TaskError, match="nobody plays PickCube-v1; name its policy, or one for 'o"):
+    with pytest.raises(TaskError, match="PickCube-v1 has no policy; name one, or one for 'o"):
         players({"PushT-v1": STILL})
     with pytest.raises(TaskError, match="the policy of PushT-v1 is given twice"):
         players({"PushT-v1": STILL, "push_t": STILL})

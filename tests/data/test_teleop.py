@@ -9,11 +9,10 @@ import torch
 import tasks
 from layouts import Layout, Placement
 from robot_layouts.data.playing.replay import replay
-from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.recorder import Recorder
-from robot_layouts.data.teleop.pace import MOST_BEHIND, Pace
 from robot_layouts.data.teleop.session import Phase, Session
+from robot_layouts.data.teleop.widgets import MOST_BEHIND, Pace
 from robot_layouts.kinematics.rotations import inverse, multiply
 from robots import RecordingError, TaskError, UnknownNameError
 from tests.data.steering_hands import yaw_between

@@ -11,8 +11,7 @@ import tasks
 from benchmarks.teleop import served
 from robot_layouts.data.playing.replay import replay
 from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.teleop.session import Session
 from tests.data.steering_hands import Hands, yaw_between
 from tests.pages import browser_page

@@ -10,12 +10,11 @@ import pytest
 
 import tasks
 from layouts.viewer.server import REST, serving
-from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.recorder import Recorder
-from robot_layouts.data.teleop.pace import MOST_BEHIND
 from robot_layouts.data.teleop.page import TeleopPage
 from robot_layouts.data.teleop.session import Phase, Session
+from robot_layouts.data.teleop.widgets import MOST_BEHIND
 from tests.layouts.guests import WEBSOCKET, Guest, ask
 from tests.pages import wait_until
 

@@ -10,7 +10,8 @@ import pytest
 
 import tasks
 from layouts import Layout
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robots import LocalUrdf, RobotRegistry
 from tasks.episode import play

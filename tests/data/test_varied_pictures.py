@@ -8,9 +8,9 @@ import pytest
 
 import tasks
 from robot_layouts.data import record
-from robot_layouts.data.playing.replay import replay, task_for
-from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.playing.replay import replay
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.simulation.rendering import Observers
 from tasks import (
     CameraShift,

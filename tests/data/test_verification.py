@@ -14,7 +14,7 @@ import torch
 
 from robot_layouts.__main__ import main
 from robot_layouts.data.receipts import EpisodeReceipt, Receipt, ReceiptError
-from robot_layouts.data.receipts.comparison import first_step
+from robot_layouts.data.receipts.verification import first_step
 from robots import LocalUrdf, RobotDescriptor, RobotRegistry
 from tasks.registry import TASKS
 from tests.data.policies import LEANS, still

@@ -64,8 +64,9 @@ class Nobody:
 
     def run(self, prepare: Any, seeds: Any) -> Any:
         """Play, after a fashion."""
-        from robot_layouts.data.playing.executor import Event, WorkerError
+        from robot_layouts.core.processes.start import WorkerError
         from robot_layouts.data.playing.in_process import InProcessExecutor
+        from robot_layouts.data.playing.scheduler import Event
 
         if self.what == "forgets one":
             yield from InProcessExecutor().run(prepare, seeds[1:])

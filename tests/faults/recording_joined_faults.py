@@ -70,7 +70,8 @@ def _flip_and_use(folder: Path, where: str, use: Callable[[Path], Any]) -> None:
 
 
 def _replay(path: Path) -> None:
-    from robot_layouts.data.playing.replay import open_recording, replay, task_for
+    from robot_layouts.data.playing.replay import open_recording, replay
+    from robot_layouts.data.reading.recorded_task import task_for
 
     with open_recording(path, None) as file:
         task = task_for(file)

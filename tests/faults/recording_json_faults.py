@@ -90,7 +90,8 @@ def _remove(folder: Path, place: tuple[str | int, ...]) -> None:
 
 def _play(path: Path) -> None:
     """Do with a recording what a replay does before it plays."""
-    from robot_layouts.data.playing.replay import open_recording, task_for
+    from robot_layouts.data.playing.replay import open_recording
+    from robot_layouts.data.reading.recorded_task import task_for
 
     with open_recording(path, None) as file:
         task_for(file).close()

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from layouts import Layout, Placement, single
-from robot_layouts.data.suite.files import read_layout
+from robot_layouts.data.suite.suite import read_layout
 from robot_layouts.motion import Motion
 from robots import RobotDescriptor
 from robots.named import named_robot

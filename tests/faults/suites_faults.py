@@ -56,7 +56,7 @@ def faults() -> Iterator[Fault]:
 
 
 def _load(folder: Path, text: str) -> None:
-    from robot_layouts.data.suite.files import load_suite
+    from robot_layouts.data.suite.suite import load_suite
 
     (folder / "suite.yaml").write_text(text)
     load_suite(folder / "suite.yaml")
@@ -171,7 +171,7 @@ _ELSEWHERE = {
 
 def _reads_nothing(folder: Path, key: str, value: str) -> None:
     """Read a suite in a folder below that of a secret; no message tells the secret."""
-    from robot_layouts.data.suite.files import load_suite
+    from robot_layouts.data.suite.suite import load_suite
     from robots import RobotLayoutsError
 
     (folder / "secret.yaml").write_text(SECRET)
@@ -220,7 +220,7 @@ def _runs_nothing(folder: Path, words: tuple[str, ...], text: str) -> None:
 
 
 def _suite(folder: Path, text: str = SUITE) -> Any:
-    from robot_layouts.data.suite.files import load_suite
+    from robot_layouts.data.suite.suite import load_suite
 
     (folder / "mine.yaml").write_text(text)
     return load_suite(folder / "mine.yaml")

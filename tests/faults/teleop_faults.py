@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 import tasks
-from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording.record import FILE
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.data.teleop.session import Session
 from robots import RecordingError, TaskError

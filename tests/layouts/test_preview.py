@@ -18,7 +18,8 @@ from layouts import (
     single,
     wall,
 )
-from layouts.preview import DOTS_PER_INCH, SUPPORTED, WIDTH, draw
+from layouts.preview import WIDTH, draw
+from robot_layouts.core.figures import DOTS_PER_INCH, SUPPORTED
 from robots import LayoutError, MissingPackageError
 from tests.layouts.cells import overlapping
 

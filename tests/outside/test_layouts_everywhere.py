@@ -11,8 +11,10 @@ import tasks
 from layouts import Layout, Placement, ring
 from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate
-from robot_layouts.data.playing.replay import open_recording, replay, task_for
-from robot_layouts.data.reading.recording import Recording, TrajectoryError
+from robot_layouts.data.playing.replay import open_recording, replay
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.record import record
 from robot_layouts.data.recording.recorder import Recorder
 from robots import ActionError, RobotRegistry, TaskError

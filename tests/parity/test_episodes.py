@@ -14,7 +14,7 @@ from parity.episodes import (
     random_episodes,
     recorded_source,
 )
-from robot_layouts.data.reading.recording import TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
 from robots import TaskError
 
 TASK = "PickCube-v1"

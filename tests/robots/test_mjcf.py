@@ -11,8 +11,8 @@ import trimesh
 
 from benchmarks.robots.probe import kinematic_difference
 from layouts import single
-from robot_layouts.data.reading.guessed_robots import describe_guessed, guess_again
-from robot_layouts.data.reading.summary import TrajectoryError
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.provenance import describe_guessed, guess_again
 from robots import (
     AssetError,
     DescriptorError,

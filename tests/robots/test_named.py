@@ -121,7 +121,7 @@ def test_a_path_without_an_ending_stays_a_path(folder):
 
 
 def test_a_suite_runs_no_code_for_its_robots(folder, capsys):
-    from robot_layouts.data.suite.files import read_layout
+    from robot_layouts.data.suite.suite import read_layout
 
     robots = {"left": "panda", "right": "toy_robots:TINY"}
     places = {place: {"robot": word} for place, word in robots.items()}

@@ -1,11 +1,14 @@
 """Files and folders that appear whole or not at all."""
 
 import os
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from layouts.export.files import replaced_folder
 from robot_layouts.core.errors import UnwritableFileError
 from robot_layouts.core.writing import write_whole, writing_errors, written_whole
+from robot_layouts.data.recording.disk import claim
 from robots import RecordingError, TaskError
 
 
@@ -96,6 +99,38 @@ def test_two_writers_of_one_file_do_not_meet(tmp_path):
         other.write_text("other")
     assert (tmp_path / "cell").read_text() == "one"
     assert names(tmp_path) == ["cell"]
+
+
+def in_threads(write, count=6):
+    """Call something in several threads at once; what it raises is raised here."""
+    with ThreadPoolExecutor(count) as pool:
+        for done in [pool.submit(write) for _ in range(count)]:
+            done.result()
+
+
+def test_threads_replace_one_folder(tmp_path):
+    def write():
+        for _ in range(50):
+            with replaced_folder(tmp_path / "assets", lambda found: True, "move it") as made:
+                (made / "mesh.stl").write_text("")
+
+    in_threads(write)
+    assert names(tmp_path) == ["assets", "mesh.stl"]
+
+
+def test_threads_claim_one_folder(tmp_path):
+    holders = []
+
+    def hold():
+        for _ in range(300):
+            if (lock := claim(tmp_path / "parts")) is not None:
+                holders.append(lock)
+                assert len(holders) == 1
+                holders.clear()
+                (tmp_path / "parts").rmdir()
+                os.close(lock)
+
+    in_threads(hold)
 
 
 def test_a_page_of_words_by_hdf5_is_made_short(tmp_path):

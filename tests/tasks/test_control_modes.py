@@ -7,7 +7,7 @@ import tasks
 from layouts import single
 from parity.episodes import random_episodes
 from parity.lockstep import HISTORIES
-from robot_layouts.data.playing.plan_conversion import as_positions
+from robot_layouts.data.playing.mode_conversion import as_positions
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import CONTROL_MODES, DescriptorError, RobotRegistry, TaskError, UnknownNameError
 from tasks.episode import Episode, play

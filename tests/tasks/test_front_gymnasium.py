@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 import tasks
 from robot_layouts.simulation.rendering import vulkan_problem
 from robots import TaskError, UnknownNameError
-from tasks import fronts
+from tasks import interfaces
 from tasks.interfaces.gymnasium import GymnasiumTask
 from tasks.registry import CATALOGUE
 from tests.quick import quick_cases
@@ -120,7 +120,7 @@ def test_ids_follow_the_list_of_tasks():
 
 
 def test_registering_twice_warns_of_nothing(recwarn):
-    fronts.register()
+    interfaces.register()
     assert not list(recwarn)
 
 

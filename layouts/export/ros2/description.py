@@ -12,7 +12,7 @@ from layouts.export.ros2.groups import WORLD, RosNames
 from layouts.visuals import GREY, Rgba
 from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of
-from robots.urdf.model import Inertial, ModelJoint
+from robots.urdf.model import LinkInertia, ModelJoint
 
 SPEEDS = {"rad": 1.0, "m": 0.1}  # per second, of joints whose URDF has no largest speed
 
@@ -133,7 +133,7 @@ def _limit(joint: ModelJoint, source: RobotSource) -> dict[str, str]:
     return limit
 
 
-def _inertial(inertial: Inertial) -> Element:
+def _inertial(inertial: LinkInertia) -> Element:
     made = Element("inertial")
     SubElement(made, "origin", xyz=_text(inertial.origin[:3, 3].tolist()), rpy="0 0 0")
     SubElement(made, "mass", value=repr(inertial.mass))

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.data.reading.recording import Recording, Trajectory, TrajectoryError
-from robot_layouts.data.sources.actors import EXPERT
+from robot_layouts.data.actors import EXPERT
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.recording import Recording, Trajectory
 from robots import RobotDescriptor
 from tasks import TaskEnv
 from tasks.engine.columns import placed_bodies
@@ -29,7 +30,7 @@ class Credits:
     """Who acted in a recording.
 
     Attributes:
-        actors: Everybody who acted, each once, as plain data; nobody if no episode says it.
+        actors: Everybody who acted, each once, as plain data; empty if no episode says it.
         corrected: Whether all episodes hold what a corrector would have done.
     """
 
@@ -113,7 +114,7 @@ class ColumnReader:
 
         Args:
             task: The task that was recorded.
-            credits: Who acted in the recording; None: nobody says.
+            credits: Who acted in the recording; None if that is unknown.
         """
         self.task, self.credits = task, credits
         placements = task.layout.items()

@@ -2,32 +2,218 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+import os
+import re
+import shutil
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
+from layouts import Layout
+from layouts.placement import RobotLike
+from robot_layouts.core.bounds import shown
+from robot_layouts.core.cli import Folder, Word
+from robot_layouts.core.commands import UsageError
+from robot_layouts.core.pages import plural
+from robot_layouts.core.progress import Progress as ProgressLine
+from robot_layouts.core.writing import PARTIAL, writing_errors, written_whole
 from robot_layouts.data.export.columns import ColumnReader, Columns, Credits, succeeded
-from robot_layouts.data.export.folder import new_folder
-from robot_layouts.data.export.options import FORMATS, Export
+from robot_layouts.data.playing.command_options import (
+    PictureSize,
+    Players,
+    RecordingPath,
+    stop_signals,
+)
 from robot_layouts.data.playing.executor import ProcessExecutor
+from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_class, task_for
-from robot_layouts.data.reading.recording import Recording, Trajectory, TrajectoryError
-from robots import TaskError
+from robot_layouts.data.reading.recording import Recording, Trajectory
+from robot_layouts.data.recording.disk import claim
+from robots import MissingPackageError, RecordingError, TaskError, UnknownNameError
 from tasks.description import instruction_of
+from tasks.engine.cameras import Size, checked_size
+from tasks.engine.columns import OVERVIEW
 
 if TYPE_CHECKING:
-    from robot_layouts.data.export.drawing_job import DrawnEpisode
-    from robot_layouts.data.export.pictures import Drawing
+    from robot_layouts.data.export.drawing import Drawing, DrawnEpisode
     from robot_layouts.data.export.shots import Shots
     from robot_layouts.data.export.writer import DatasetWriter
     from robot_layouts.data.playing.executor import Executor
-
-__all__ = ["FORMATS", "Export", "Exported", "export"]
+FORMATS = ("lerobot", "robomimic")
+INSTALL = "pip install 'robot-layouts[export]'"
 
 Progress = Callable[[float, int], None]
 Draw = Callable[[Columns], "Drawing | DrawnEpisode | None"]
+
+
+@contextmanager
+def new_folder(path: Path) -> Generator[Path]:
+    """Make a folder whose content is complete.
+
+    What exports to the same folder left behind when they were killed is removed first.
+
+    Args:
+        path: The folder; it may be there already if it is empty; see `refuse_used`.
+
+    Yields:
+        A folder beside it to write into, which takes its place at the end.
+
+    Raises:
+        RecordingError: If the folder cannot be written.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}{PARTIAL}")
+    with writing_errors(path, RecordingError):
+        partial.parent.mkdir(parents=True, exist_ok=True)
+        _remove_abandoned(path)
+        lock = claim(partial)
+        if lock is None:
+            raise RecordingError(f"another process is writing {partial}")
+        try:
+            with written_whole(path, RecordingError, partial=partial):
+                yield partial
+        finally:
+            os.close(lock)
+
+
+def refuse_used(path: Path) -> None:
+    """Refuse a path at which something is already, other than an empty folder.
+
+    Raises:
+        RecordingError: If so.
+    """
+    with writing_errors(path, RecordingError):
+        try:
+            used = any(path.iterdir())
+        except FileNotFoundError:
+            return
+        except NotADirectoryError as error:
+            raise RecordingError(f"{path} is a file; a folder's name is needed") from error
+    if used:
+        raise RecordingError(f"{path} is not empty; choose another folder, or empty it")
+
+
+def _remove_abandoned(path: Path) -> None:
+    """Remove the unfinished folders of processes that have ended; the others lock theirs."""
+    unfinished = re.compile(rf"\.{re.escape(path.name)}\.[0-9]+\.partial")
+    for entry in list(os.scandir(path.parent)):
+        if unfinished.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
+            lock = claim(Path(entry.path), certain=True)
+            if lock is not None:
+                shutil.rmtree(entry.path, ignore_errors=True)
+                os.close(lock)
+
+
+@dataclass(frozen=True)
+class Export:
+    """What is exported, and as what.
+
+    Attributes:
+        recording: An h5 file, ours or native's, with its json beside it, or a recording's folder.
+        format: ``"lerobot"`` or ``"robomimic"``.
+        out: Folder of the dataset; it must be new or empty.
+        fps: Control steps per second that the dataset states (``"lerobot"`` only); those of the
+            task if None.
+        video: Whether pictures are drawn and written as videos (``"lerobot"`` only); those of the
+            overview unless ``cameras`` says more.
+        include_failures: Whether episodes whose last step is no success are exported, too.
+        task: The recording's task; ``module:Id`` for one of a module that no package lists.
+        layout: Where its robots stood, where the recording cannot say it.
+        robots: Which robots these were, where the recording cannot say it.
+        cameras: Which cameras' pictures are drawn: names by place such as ``"base_camera"`` and
+            ``"left.hand_camera"``, ``"overview"``, or ``"all"`` for those of the task and its
+            robots. Videos in a LeRobot dataset, arrays in a robomimic one.
+        images: Whether a LeRobot dataset holds png images, which lose nothing, in place of videos.
+        depth: Whether the cameras of the task and its robots tell of depth, too (mm, 16 bits); in
+            a LeRobot dataset always as png images.
+        size: Width and height of their pictures (pixels); None: each camera's own.
+        instruction: What is to be done, in a sentence: of all episodes, or by ``episode_id``. Those
+            without have their source's (``"instruction"`` in `Trajectory.source`), else their
+            task's.
+    """
+
+    recording: str | PathLike[str]
+    format: str
+    out: str | PathLike[str]
+    fps: int | None = None
+    video: bool = False
+    include_failures: bool = False
+    task: str | None = None
+    layout: Layout | None = None
+    robots: Mapping[str, RobotLike] | None = None
+    cameras: str | Sequence[str] | None = None
+    images: bool = False
+    depth: bool = False
+    size: Size | None = None
+    instruction: str | Mapping[int, str] | None = None
+
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Which cameras' pictures are drawn; none if there are no pictures."""
+        if self.cameras is None:
+            return (OVERVIEW,) if self.video else ()
+        return (self.cameras,) if isinstance(self.cameras, str) else tuple(self.cameras)
+
+    def check(self, *, here: bool = True) -> None:
+        """Refuse what cannot be done.
+
+        Args:
+            here: Whether this machine draws the pictures; others say themselves if they cannot.
+
+        Raises:
+            UnknownNameError: If there is no such format.
+            TaskError: If options do not go together.
+            MissingPackageError: If a package that they need is not installed.
+            SimulationError: If there is no Vulkan driver to draw pictures with.
+            RecordingError: If the folder holds something already.
+        """
+        if self.format not in FORMATS:
+            raise UnknownNameError("export format", self.format, FORMATS)
+        if self.fps is not None and self.fps < 1:
+            raise TaskError(f"fps is {self.fps}; it must be 1 or more")
+        if self.format == "lerobot" and find_spec("pyarrow") is None:
+            raise MissingPackageError(f"LeRobot datasets need pyarrow: {INSTALL}")
+        if self.format == "robomimic":
+            self._expect_robomimic()
+        self._expect_pictures(here=here)
+        refuse_used(Path(self.out))
+
+    def _expect_robomimic(self) -> None:
+        for what in ("video", "images", "fps"):
+            if getattr(self, what) not in (None, False):
+                words = "" if what == "fps" else "cameras, whose pictures it holds, or "
+                raise TaskError(
+                    f"a robomimic dataset has no {what} here; leave it out, or choose"
+                    f" {words}lerobot"
+                )
+
+    def _expect_pictures(self, *, here: bool) -> None:
+        names = self.camera_names
+        if not all(isinstance(name, str) for name in names):
+            raise TaskError(f"cameras are {shown(self.cameras)}; their names are needed")
+        if self.cameras is None:
+            for what in ("images", "depth", "size"):
+                if getattr(self, what) not in (None, False):
+                    raise TaskError(f"{what} is of no use without cameras; choose some, or 'all'")
+        elif not names:
+            raise TaskError("no camera is named; leave cameras out, or name some")
+        if self.video and self.images:
+            raise TaskError("pictures are either a video or images; choose one of them")
+        if self.size is not None:
+            checked_size("size", self.size)
+        if names:
+            from robot_layouts.data.export.drawing import require_pictures
+
+            lerobot = self.format == "lerobot"
+            require_pictures(
+                video=lerobot and not self.images,
+                images=lerobot and (self.images or self.depth),
+                driver=here,
+                without="video" if self.cameras is None else "cameras",
+            )
 
 
 @dataclass(frozen=True)
@@ -131,7 +317,7 @@ class _Work:
         self._instruction = instruction_of(task.task_class)
 
     def text(self, trajectory: Trajectory) -> str | None:
-        """Return what is to be done in an episode; None if nobody says so or asks.
+        """Return what is to be done in an episode; None if no text is given.
 
         The task's own is given with pictures alone, as robomimic datasets of old held none.
         """
@@ -177,11 +363,11 @@ class _Work:
             return
         last = wanted.format == "robomimic"  # which holds what is seen after a step, too
         if executor is None:
-            from robot_layouts.data.export.pictures import Drawing
+            from robot_layouts.data.export.drawing import Drawing
 
             yield lambda columns: Drawing(task, columns, shots, last=last)
             return
-        from robot_layouts.data.export.drawing_job import DrawingJob, draw_in_order
+        from robot_layouts.data.export.drawing import DrawingJob, draw_in_order
 
         path = Path(wanted.recording).absolute()
         job = DrawingJob(path, task.task_class, shots, last, wanted.layout, wanted.robots)
@@ -226,3 +412,77 @@ def _origin(file: Recording, reader: ColumnReader) -> dict[str, Any]:
         "layout": file.layout,
         **({"actors": actors} if actors else {}),
     }
+
+
+def export_command(
+    recording: RecordingPath,
+    *,
+    format: Annotated[str, Word("FORMAT")],
+    out: Folder,
+    fps: int | None = None,
+    video: bool = False,
+    cameras: Sequence[Annotated[str, Word("NAME")]] | None = None,
+    images: bool = False,
+    depth: bool = False,
+    size: PictureSize | None = None,
+    instruction: Annotated[str, Word("TEXT")] | None = None,
+    include_failures: bool = False,
+    only_successes: bool = False,
+    task: str | None = None,
+    players: Players,
+) -> None:
+    """Write a recording as a dataset for LeRobot or robomimic.
+
+    The dataset appears when it is complete. Exit code: 0 if it was written, 1 if not, 2 for bad
+    usage.
+
+    Args:
+        recording: An h5 file, or a recording's folder.
+        format: Format of the dataset: lerobot or robomimic.
+        out: New folder for the dataset.
+        fps: Steps per second to state (default: the task's, 20).
+        video: Draw every step as well (lerobot; needs Vulkan).
+        cameras: Draw what these cameras see, as videos (lerobot) or arrays (robomimic): all,
+            overview, or by place: base_camera, left.hand_camera.
+        images: Write png images, which lose nothing, in place of videos.
+        depth: Write the cameras' depth as well (mm, 16 bits).
+        size: Width and height of the pictures in pixels (each camera's own).
+        instruction: What the policy is to do, in words (the task's own).
+        include_failures: Export episodes without success, too.
+        only_successes: What happens anyway.
+        task: The recording's task; MODULE:ID for one of your own.
+        players: Who plays.
+
+    Raises:
+        RobotLayoutsError: If the export fails; see `export`.
+    """
+    if include_failures and only_successes:
+        raise UsageError("--include-failures and --only-successes contradict each other")
+    wanted = Export(
+        recording,
+        format,
+        out,
+        fps=fps,
+        video=video,
+        include_failures=include_failures,
+        task=task,
+        cameras=cameras,
+        images=images,
+        depth=depth,
+        size=size,
+        instruction=instruction,
+    )
+    in_process = players.workers == 0 and players.ray is None
+    executor = None if in_process else players.executor()
+    with ProgressLine(unit="episodes") as line, stop_signals():
+
+        def show(done: float, total: int) -> None:
+            line.total = total
+            line.update(round(done, 1), f"exporting {recording.name}")
+
+        done = export(wanted, show, executor=executor, tell=line.say)
+    left_out = ""
+    if done.left_out:
+        failures = plural(done.left_out, "episode")
+        left_out = f"; left out: {failures} without success (--include-failures exports them)"
+    print(f"{done.folder}: {plural(done.episodes, 'episode')}, {done.steps} steps{left_out}")

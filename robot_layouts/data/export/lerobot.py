@@ -17,11 +17,11 @@ from robot_layouts.data.export.lerobot_files import (
     DATA_PATH,
     EPISODES_PATH,
     VIDEO_PATH,
-    Limits,
+    FileLimits,
     ParquetFiles,
+    PictureWriter,
 )
-from robot_layouts.data.export.lerobot_pictures import PictureWriter
-from robot_layouts.data.export.shots import Channel, Frame
+from robot_layouts.data.export.shots import Frame, PictureChannel
 from robot_layouts.data.export.statistics import describe_numbers, flatten
 from robot_layouts.data.export.writer import DatasetWriter
 from tasks.engine.columns import lerobot_columns
@@ -40,12 +40,12 @@ class LeRobotWriter(DatasetWriter):
         folder: Path,
         reader: ColumnReader,
         origin: Mapping[str, Any],
-        channels: Sequence[Channel] = (),
+        channels: Sequence[PictureChannel] = (),
         *,
         task_text: str,
         fps: int,
         images: bool = False,
-        limits: Limits | None = None,
+        limits: FileLimits | None = None,
     ) -> None:
         """Begin a dataset.
 
@@ -63,7 +63,7 @@ class LeRobotWriter(DatasetWriter):
             TaskError: If no video can have a picture's size.
         """
         super().__init__(folder, reader, origin)
-        self._task_text, self._fps, self._limits = task_text, fps, limits or Limits()
+        self._task_text, self._fps, self._limits = task_text, fps, limits or FileLimits()
         self._data = ParquetFiles(folder, DATA_PATH, self._limits)
         self._episodes = ParquetFiles(folder, EPISODES_PATH, self._limits)
         self._pictures = PictureWriter(folder, channels, fps, self._limits, images=images)
@@ -120,7 +120,7 @@ class LeRobotWriter(DatasetWriter):
     ) -> dict[str, tuple[dict[str, Any], Number]]:
         """Return description and values, (T, k), of every feature that is no picture.
 
-        A row holds the state before a step, the step's action, and what came of it.
+        A row holds the state before a step, the step's action, and its result.
         """
         steps = len(columns)
         frames = np.arange(steps)

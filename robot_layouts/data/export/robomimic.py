@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from robot_layouts.data.export.columns import POSE, ColumnReader, Columns, Floats
-from robot_layouts.data.export.shots import Channel, Frame
+from robot_layouts.data.export.shots import Frame, PictureChannel
 from robot_layouts.data.export.writer import DatasetWriter
 from robot_layouts.data.recording.disk import DiskFile
 from robots.control_modes import plain_mode
@@ -35,7 +35,7 @@ class RobomimicWriter(DatasetWriter):
         folder: Path,
         reader: ColumnReader,
         origin: Mapping[str, Any],
-        channels: Sequence[Channel] = (),
+        channels: Sequence[PictureChannel] = (),
         *,
         size: Size | None = None,
     ) -> None:
@@ -192,7 +192,7 @@ def flat_states(states: States) -> Floats:
     return np.concatenate([rows for entries in states.values() for rows in entries.values()], 1)
 
 
-def _pictures(demo: Any, name: str, steps: int, channel: Channel) -> Any:
+def _pictures(demo: Any, name: str, steps: int, channel: PictureChannel) -> Any:
     shape = channel.shape
     return demo.create_dataset(
         name,

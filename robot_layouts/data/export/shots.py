@@ -23,7 +23,7 @@ Picture = NDArray[Any]  # uint8 (colours) or int16 (mm)
 
 
 @dataclass(frozen=True)
-class Channel:
+class PictureChannel:
     """One picture of every moment.
 
     Attributes:
@@ -49,7 +49,7 @@ class Channel:
         return np.uint8 if self.texture == RGB else np.int16
 
 
-Frame = Mapping[Channel, Picture]
+Frame = Mapping[PictureChannel, Picture]
 """All pictures of one moment."""
 
 
@@ -74,11 +74,11 @@ class Shots:
         return (RGB, DEPTH) if self.depth else (RGB,)
 
     @property
-    def channels(self) -> list[Channel]:
+    def channels(self) -> list[PictureChannel]:
         """Every picture of a moment, in the order of the dataset."""
-        whole = [Channel(OVERVIEW, RGB, SIZE, SIZE)] if self.viewpoint else []
+        whole = [PictureChannel(OVERVIEW, RGB, SIZE, SIZE)] if self.viewpoint else []
         return whole + [
-            Channel(name, texture, *size_of(camera))
+            PictureChannel(name, texture, *size_of(camera))
             for name, camera in self.cameras.items()
             for texture in self.textures
         ]

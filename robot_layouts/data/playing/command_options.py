@@ -18,7 +18,9 @@ from robots.control_modes import read_mode
 from tasks.cell_options import RecordedCell
 
 if TYPE_CHECKING:
+    from robot_layouts.core.progress import Progress
     from robot_layouts.data.playing.executor import Executor
+    from robot_layouts.data.playing.scheduler import Event
     from robot_layouts.data.reading.recording import Recording
 
 INTERRUPTED = 130  # exit code, as shells have it
@@ -130,11 +132,31 @@ class RecordingOption:
     task: str | None = None
     cell: RecordedCell
 
+    @property
+    def path(self) -> Path:
+        """Where it is; see `robot_layouts.data.playing.replay.recording_path`."""
+        from robot_layouts.data.playing.replay import recording_path
+
+        return recording_path(self.file, self.task)
+
     def open(self) -> AbstractContextManager[Recording]:
         """Open it; see `robot_layouts.data.playing.replay.open_recording`."""
         from robot_layouts.data.playing.replay import open_recording
 
         return open_recording(self.file, self.task)
+
+    @staticmethod
+    def count(file: Recording, episodes: int | None) -> int:
+        """Return how many episodes of a file are asked for and there; None asks for all."""
+        return len(file) if episodes is None else max(0, min(episodes, len(file)))
+
+
+def tell(line: Progress, event: Event, failed: str = "") -> None:
+    """Print what happened to workers and, if there are words for it, why an episode has failed."""
+    if event.news is not None:
+        line.say(event.news)
+    if event.error is not None and failed:
+        line.say(f"seed {event.seed} {failed}: {event.error}")
 
 
 @contextmanager

@@ -1,21 +1,71 @@
-"""Plays the episodes of an evaluation in workers, and keeps how they went."""
+"""Plays the episodes of an evaluation in workers, and keeps how they went and what they were."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from hashlib import sha256
 from typing import Any, NoReturn
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
-from robot_layouts.data.playing.casting import Cast, Casting
 from robot_layouts.data.playing.environment import environment
-from robot_layouts.data.playing.executor import Event, Executor, modules_of, play_all
-from robot_layouts.data.playing.state_trace import StateTrace, trace_of
-from robot_layouts.data.playing.together import one_by_one, play_together, states_together
-from tasks import MultiRobotTask, Scenario
-from tasks.episode import Score
+from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.scheduler import Event
+from robot_layouts.data.playing.together import (
+    EpisodesJob,
+    EpisodesPlay,
+    one_by_one,
+    play_together,
+    states_together,
+)
+from tasks.episode import Score, States
+
+BYTES = 2  # of the digest that are kept of each moment
+
+
+@dataclass(frozen=True)
+class StateTrace:
+    """What identifies the states of an episode of T steps.
+
+    Attributes:
+        states: SHA-256, in hex, over all T + 1 states.
+        trace: The first two bytes of that digest as it stood at each of these, in base64.
+    """
+
+    states: str
+    trace: str
+
+
+def trace_of(states: States) -> StateTrace:
+    """Return the digest of an episode's states.
+
+    It is over the names, types and sizes of the state dict's entries, sorted by name, and then
+    over the bytes of these entries after the reset and after each step.
+
+    Args:
+        states: State dict of `TaskEnv.get_state_dict`, each entry (T + 1, k).
+    """
+    entries = {
+        f"{kind}/{name}": rows
+        for kind, by_name in sorted(states.items())
+        for name, rows in sorted(by_name.items())
+    }
+    about = (f"{name} {rows.dtype.str} {rows.shape[1:]}\n" for name, rows in entries.items())
+    digest = sha256("".join(about).encode())
+    kept: list[bytes] = []
+    for moment in np.concatenate([_bytes(rows) for rows in entries.values()], axis=1):
+        digest.update(moment)
+        kept.append(digest.digest()[:BYTES])
+    return StateTrace(digest.hexdigest(), b64encode(b"".join(kept)).decode())
+
+
+def _bytes(rows: NDArray[np.float32]) -> NDArray[np.uint8]:
+    return np.ascontiguousarray(rows).reshape(len(rows), -1).view(np.uint8)
 
 
 @dataclass(frozen=True)
@@ -32,43 +82,23 @@ class TracedScore(Score):
 
 
 @dataclass(frozen=True)
-class EvaluationJob:
-    """Everything but the seed that decides an episode; can be pickled.
+class EvaluationJob(EpisodesJob):
+    """Episodes whose scores count.
 
     Attributes:
-        task: Class of the task.
-        scenario: How to make it.
-        cast: Who plays.
-        together: Seeds that are played at once, by the first of them.
         traced: Whether each score is to be a `TracedScore`.
         most_steps: Seed → steps after which its episode ends, if it has not ended before.
     """
 
-    task: type[MultiRobotTask]
-    scenario: Scenario
-    cast: Cast
-    together: Mapping[int, tuple[int, ...]] = field(default_factory=dict[int, tuple[int, ...]])
     traced: bool = False
     most_steps: Mapping[int, int] = field(default_factory=dict[int, int])
 
-    @property
-    def modules(self) -> tuple[str, ...]:
-        """What other machines may need to play it."""
-        return modules_of(self.task, *self.cast.members)
-
     def __call__(self) -> Callable[[int], dict[int, Score]]:
         """Make the task in a worker, and return what plays the episodes of a seed and others."""
-        torch.set_num_threads(1)  # as many everywhere, so that sums are the same
         return _Play(self)
 
 
-class _Play:
-    """Plays episodes in the worlds of one task, which are built anew for each."""
-
-    def __init__(self, job: EvaluationJob) -> None:
-        self._job, self._env = job, job.task(job.scenario)
-        self._casting = Casting(job.cast, self._env)
-
+class _Play(EpisodesPlay[EvaluationJob]):
     def __call__(self, seed: int) -> dict[int, Score]:
         """Play the episodes of a seed and of those that are played together with it."""
         players = [self._casting(seed) for seed in self._job.together[seed]]
@@ -85,11 +115,6 @@ class _Play:
             )
             for player, states in zip(players, played, strict=True)
         }
-
-    def close(self) -> None:
-        """Let the worlds go."""
-        self._env.close()
-        self._casting.close()
 
 
 def scores_of(

@@ -7,9 +7,10 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
 from typing import Any, Protocol
 
-from robot_layouts.core.processes.start import preload
+from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.processes.start import WorkerError, preload
 from robot_layouts.core.processes.transport import packed
-from robot_layouts.core.processes.worker import Pool, Reply, Worker, report
+from robot_layouts.core.processes.worker import Pool, Reply, Worker
 from robot_layouts.data.playing.scheduler import (
     DEATHS_ALLOWED,
     EPISODE_SECONDS,
@@ -18,26 +19,8 @@ from robot_layouts.data.playing.scheduler import (
     Play,
     RetryPolicy,
     Scheduler,
-    WorkerError,
-    WorkersDied,
-    check_count,
 )
 from robots import TaskError
-
-__all__ = [
-    "DEATHS_ALLOWED",
-    "EPISODE_SECONDS",
-    "Event",
-    "Executor",
-    "Play",
-    "ProcessExecutor",
-    "WorkerError",
-    "WorkersDied",
-    "choose_executor",
-    "modules_of",
-    "play_all",
-    "report",
-]
 
 preload("tasks.engine.env", "robot_layouts.simulation")
 
@@ -93,7 +76,7 @@ class ProcessExecutor:
             TaskError: If a number is not valid.
         """
         if workers is not None:
-            check_count("workers", workers, 1)
+            checked_whole("workers", workers, 1, None, TaskError)
         self.workers = len(os.sched_getaffinity(0)) if workers is None else workers
         self._policy = RetryPolicy(attempts, fresh, episode_timeout)
 
@@ -146,7 +129,7 @@ def choose_executor(
         TaskError: If a number is not valid, or contradicts the executor.
     """
     if workers is not None:
-        check_count("workers", workers, 0)
+        checked_whole("workers", workers, 0, None, TaskError)
     limited = episode_timeout != EPISODE_SECONDS
     if executor is not None:
         if workers is not None or limited:

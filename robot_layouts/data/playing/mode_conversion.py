@@ -5,6 +5,8 @@ driven to and where it was after that. Then it is played in the other mode, with
 step that drives from where the robots are to the reference. The next attempt drives a group further
 by as much as this one missed, step by step, until the task is solved: iterative learning control.
 Physics repeats itself to the last bit, so that this converges where the mode can move as asked.
+
+Experts plan in deltas; `Planner` converts what they plan.
 """
 
 from __future__ import annotations
@@ -16,12 +18,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.experts.registry import Expert
+from robot_layouts.experts.rehearsal import rehearsed
 from robot_layouts.kinematics.rotations import Floats, inverse, multiply
 from robot_layouts.simulation import State
-from robots import JointGroup
+from robots import CONTROL_MODES, JointGroup, TaskError
 from tasks import TaskEnv
 from tasks.driving import DrivenGroup, TcpDrive, VelocityDrive, drive_of, driven_groups
-from tasks.episode import REBUILT, moments, open_loop
+from tasks.episode import REBUILT, PlayedEpisode, moments, open_loop
+
+_SETTLING = 10  # steps at the end, while the task is not solved
+_TURNED = 1.0  # degrees; less than that is no turn on purpose
+
+DELTAS, POSITIONS = CONTROL_MODES[:2]  # all experts plan in deltas
 
 
 class Schedule(NamedTuple):
@@ -56,8 +65,6 @@ _SCHEDULES = (
     # was given up before, after 150 s.
     Schedule(3, attempts=60, gain=0.15, noise=3e-3),
 )
-_SETTLING = 10  # steps at the end, while the task is not solved
-_TURNED = 1.0  # degrees; less than that is no turn on purpose
 
 
 @dataclass(frozen=True)
@@ -89,7 +96,7 @@ class Reference(NamedTuple):
     reached: Floats
 
 
-class Attempt(NamedTuple):
+class _Attempt(NamedTuple):
     """One attempt.
 
     Attributes:
@@ -123,7 +130,7 @@ def converted_steps(
     """
     recorded = followed(source, seed, actions)
     groups = _groups(source, task)
-    found = Attempt([], False, [], [])
+    found = _Attempt([], False, [], [])
     random = np.random.default_rng(seed)  # the same actions whenever the episode is converted
     schedules = _SCHEDULES if recorded.solved else _SCHEDULES[:1]
     if _lost_turns(recorded, task):  # it may do without them, but learning does not bring them
@@ -142,7 +149,7 @@ def converted_steps(
     return _arrays(found)
 
 
-def _arrays(found: Attempt) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
+def _arrays(found: _Attempt) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
     return np.array(found.actions, np.float32), np.array(found.steps, np.intp)
 
 
@@ -194,10 +201,10 @@ def _attempt(
     seed: int,
     steps: int,
     schedule: Schedule,
-) -> Attempt:
+) -> _Attempt:
     """Play a task along the references of its groups, for some steps of the recording."""
     task.reset(seed, options=REBUILT)
-    found = Attempt([], False, [], [])
+    found = _Attempt([], False, [], [])
     solved = False
     for step in range(steps + _SETTLING):
         if solved and (step >= steps or schedule.noise):
@@ -354,3 +361,68 @@ class _Copied(_Group):
         self, reference: Reference, random: np.random.Generator, noise: float
     ) -> Reference:
         return reference
+
+
+class Planner:
+    """What an expert does in the episodes of a task, in the task's control mode.
+
+    Attributes:
+        reason: Why its last plan does not solve the episode, in words, if the expert says so.
+        rehearsed: The episode of its last plan, if that has happened already; see
+            `robot_layouts.experts.rehearsal.rehearsed`.
+    """
+
+    def __init__(self, task: TaskEnv, expert: Expert) -> None:
+        """Make a task in deltas for the expert to plan for, if this one is in another mode."""
+        self._task, self._expert, self._played, self.reason = task, expert, task, ""
+        self.rehearsed: PlayedEpisode | None = None
+        self._converts = task.control_mode != DELTAS
+        if self._converts:
+            self._task = task.task_class(replace(task.scenario, control_mode=DELTAS))
+
+    def __call__(self, seed: int) -> NDArray[np.float32]:
+        """Return the actions (T, A) of the episode that ``seed`` begins.
+
+        In positions they move everything as planned, to the last bit; in other modes nearly, and
+        the task is stepped to find them.
+        """
+        actions = self._expert(self._task, seed)
+        self.reason = getattr(actions, "reason", "")
+        if not self._converts:
+            self.rehearsed = rehearsed(self._task, seed, actions)
+            return actions
+        if self._played.control_mode == POSITIONS:
+            return as_positions(self._task, seed, actions)
+        return converted_steps(self._task, seed, actions, self._played)[0]
+
+    def close(self) -> None:
+        """Let the worlds of its own task go, if it made one."""
+        if self._converts:
+            self._task.close()
+
+
+def as_positions(task: TaskEnv, seed: int, actions: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the actions in ``pd_joint_pos`` that move everything as these do, to the last bit.
+
+    The episode is played once, and the drive targets of each step are kept.
+
+    Args:
+        task: A task with one environment in ``pd_joint_delta_pos``.
+        seed: The episode.
+        actions: Shape (T, A).
+
+    Returns:
+        Shape (T, A): joint positions for every group that was relative (rad, m), the other
+        numbers as they are.
+
+    Raises:
+        TaskError: If the task is in another control mode.
+    """
+    if task.control_mode != DELTAS:
+        raise TaskError(f"actions of {DELTAS} are converted; the task has {task.control_mode}")
+    positions = np.array(actions, np.float32)
+    targets = followed(task, seed, positions).targets
+    for driven in driven_groups(task.layout):
+        if driven.group.delta:
+            positions[:, driven.numbers] = targets[:, driven.joints][:, : driven.group.size]
+    return positions

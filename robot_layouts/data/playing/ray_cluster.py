@@ -77,7 +77,7 @@ def check_address(address: object) -> None:
         )
 
 
-class Cluster:
+class RayCluster:
     """The cluster that this process has joined.
 
     Raises:

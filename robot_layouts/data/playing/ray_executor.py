@@ -10,11 +10,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import SentError, loaded, unsendable
 from robot_layouts.core.processes.worker import Reply, Status
 from robot_layouts.data.playing.environment import versions
 from robot_layouts.data.playing.ray_cluster import (
-    Cluster,
+    RayCluster,
     check_address,
     import_ray,
     is_own,
@@ -27,9 +29,8 @@ from robot_layouts.data.playing.scheduler import (
     Play,
     RetryPolicy,
     Scheduler,
-    WorkerError,
-    check_count,
 )
+from robots import TaskError
 
 PACKAGES = ("sapien", "torch", "numpy")  # which decide the bits of an episode
 
@@ -76,7 +77,7 @@ class RayExecutor:
         self._ray = import_ray()
         check_address(address)
         if workers is not None:
-            check_count("workers on a Ray cluster", workers, 1)
+            checked_whole("workers on a Ray cluster", workers, 1, None, TaskError)
         self._address, self._workers, self._modules = address, workers, tuple(modules)
         self._policy = RetryPolicy(attempts, fresh, episode_timeout)
 
@@ -87,7 +88,7 @@ class RayExecutor:
             return
         modules = [*self._modules, *filter(is_own, getattr(prepare, "modules", ()))]
         with joined(self._ray, self._address, modules):
-            cluster = Cluster(self._ray)
+            cluster = RayCluster(self._ray)
             backend = _Actors(self._ray, cluster, prepare)
             workers = self._workers or cluster.cpus
             yield from Scheduler(backend, seeds, workers, self._policy).events()
@@ -96,7 +97,7 @@ class RayExecutor:
 class _Actors:
     """The backend of a cluster, whose workers are actors."""
 
-    def __init__(self, ray: Any, cluster: Cluster, prepare: Callable[[], Play]) -> None:
+    def __init__(self, ray: Any, cluster: RayCluster, prepare: Callable[[], Play]) -> None:
         """Take what makes the plays.
 
         Raises:

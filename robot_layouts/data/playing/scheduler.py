@@ -9,20 +9,10 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
+from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.worker import Reply, Status
 from robots import TaskError
-
-__all__ = [
-    "Backend",
-    "Event",
-    "Play",
-    "RetryPolicy",
-    "Scheduler",
-    "SeedWorker",
-    "WorkerError",
-    "WorkersDied",
-]
 
 DEATHS_ALLOWED = 3  # of workers at one seed
 EPISODE_SECONDS = 600.0  # some hundred times what our slowest expert takes
@@ -95,7 +85,7 @@ class SeedWorker(Protocol):
 AnyWorker = TypeVar("AnyWorker", bound=SeedWorker)
 
 
-class Backend(Protocol[AnyWorker]):
+class WorkerBackend(Protocol[AnyWorker]):
     """Where workers come from: processes of this machine, or of others.
 
     A worker's first reply says that it is ready, or why it is not. Each seed then gets one reply,
@@ -151,18 +141,8 @@ class RetryPolicy:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        check_count("attempts", self.attempts, 1)
+        checked_whole("attempts", self.attempts, 1, None, TaskError)
         check_timeout(self.episode_timeout)
-
-
-def check_count(name: str, value: object, least: int) -> None:
-    """Refuse what is no whole number, or too small.
-
-    Raises:
-        TaskError: If it is.
-    """
-    if not isinstance(value, int) or isinstance(value, bool) or value < least:
-        raise TaskError(f"{name} is {value!r}; it must be a whole number, {least} or more")
 
 
 def check_timeout(value: float | None) -> None:
@@ -196,7 +176,7 @@ class Scheduler(Generic[AnyWorker]):
 
     def __init__(
         self,
-        backend: Backend[AnyWorker],
+        backend: WorkerBackend[AnyWorker],
         seeds: Iterable[int],
         workers: int,
         policy: RetryPolicy,

@@ -1,24 +1,33 @@
-"""Plays the episodes of several seeds in one task, each as if it were alone."""
+"""Plays the episodes of several seeds in one task, each as if it were alone.
+
+Who plays an episode is a policy as it was passed, or an expert's plan.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from math import fsum
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from robot_layouts.data.playing.randomness import random_states, set_random_states
+from robot_layouts.data.actors import EXPERT, check_policy, find_policy, is_person
+from robot_layouts.data.playing.executor import modules_of
+from robot_layouts.data.playing.in_process import random_states, seed_all, set_random_states
+from robot_layouts.data.playing.mode_conversion import Planner
 from robot_layouts.data.playing.scheduler import Event
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.registry import Expert
 from robots import ActionError, TaskError
-from tasks import TaskEnv
+from tasks import MultiRobotTask, Scenario, TaskEnv
 from tasks.engine.actions import ActionReader
-from tasks.episode import REBUILT, Moment, PlayedEpisode, Policy, Score, States
+from tasks.episode import REBUILT, Moment, PlayedEpisode, Policy, Score, States, open_loop
 
 Row = NDArray[np.float32]
 
@@ -27,7 +36,7 @@ class BatchError(TaskError):
     """A batched policy did not return one action for each observation."""
 
 
-class Choice(NamedTuple):
+class ChosenAction(NamedTuple):
     """What is carried out in a step of an episode.
 
     Attributes:
@@ -42,7 +51,7 @@ class Choice(NamedTuple):
 
 
 @dataclass
-class Player:
+class EpisodePlayer:
     """Who plays the episode of a seed, and what has happened in it.
 
     Attributes:
@@ -71,7 +80,7 @@ class Player:
     takeover: Policy | None = None
     corrector: Policy | None = None
     rehearsed: PlayedEpisode | None = None
-    choices: list[Choice] = field(default_factory=list[Choice])
+    choices: list[ChosenAction] = field(default_factory=list[ChosenAction])
     moments: list[Moment] = field(default_factory=list[Moment])
 
     @property
@@ -128,14 +137,14 @@ def one_by_one(event: Event) -> list[Event]:
     return [replace(event, seed=seed, result=result) for seed, result in event.result.items()]
 
 
-def play_together(env: TaskEnv, players: Sequence[Player]) -> None:
+def play_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> None:
     """Play an episode for each player until all are over; see `steps_together`."""
     if acting := _acting(players):
         for _ in steps_together(env, acting):
             pass
 
 
-def states_together(env: TaskEnv, players: Sequence[Player]) -> list[States]:
+def states_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[States]:
     """Play an episode for each player, as `steps_together` does, and return the states of each.
 
     Returns:
@@ -146,7 +155,7 @@ def states_together(env: TaskEnv, players: Sequence[Player]) -> list[States]:
     return [next(played) if p.rehearsed is None else p.rehearsed.states for p in players]
 
 
-def record_together(env: TaskEnv, players: Sequence[Player]) -> list[PlayedEpisode]:
+def record_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[PlayedEpisode]:
     """Play an episode for each player, as `steps_together` does, and keep what happens.
 
     Raises:
@@ -158,12 +167,12 @@ def record_together(env: TaskEnv, players: Sequence[Player]) -> list[PlayedEpiso
     return [next(played) if p.rehearsed is None else p.rehearsed for p in players]
 
 
-def _acting(players: Sequence[Player]) -> list[Player]:
+def _acting(players: Sequence[EpisodePlayer]) -> list[EpisodePlayer]:
     """Return those whose episodes have not happened yet."""
     return [player for player in players if player.rehearsed is None]
 
 
-def _played_states(env: TaskEnv, players: Sequence[Player]) -> list[States]:
+def _played_states(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[States]:
     if not players:
         return []
     happening = steps_together(env, players)
@@ -182,7 +191,7 @@ def _played_states(env: TaskEnv, players: Sequence[Player]) -> list[States]:
     ]
 
 
-def steps_together(env: TaskEnv, players: Sequence[Player]) -> Generator[None]:
+def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[None]:
     """Play an episode for each player, from freshly built worlds, until all are over.
 
     Every player sees its own environment alone, and draws from generators that are its own, so
@@ -233,19 +242,19 @@ def is_batched(policy: object) -> bool:
 
 
 def _choices(
-    players: Sequence[Player], running: Sequence[int], observation: Any, reader: ActionReader
-) -> Mapping[int, Choice]:
+    players: Sequence[EpisodePlayer], running: Sequence[int], observation: Any, reader: ActionReader
+) -> Mapping[int, ChosenAction]:
     """Return what is carried out in each environment."""
     at_once: dict[int, Any] = {}
     if is_batched(players[0].policy):
         at_once = _act_at_once(players[0].policy, running, observation)
-    choices: dict[int, Choice] = {}
+    choices: dict[int, ChosenAction] = {}
     for i in running:
         player = players[i]
         if player.blind:
-            choices[i] = Choice(reader.read(player.policy(None))[0].copy())
+            choices[i] = ChosenAction(reader.read(player.policy(None))[0].copy())
         elif at_once and player.takeover is None and player.corrector is None:
-            choices[i] = Choice(reader.read(at_once[i])[0].copy())
+            choices[i] = ChosenAction(reader.read(at_once[i])[0].copy())
         else:
             seen = _rows(observation, [i])
             with _own_generators(player, shared=len(players) > 1):
@@ -254,10 +263,10 @@ def _choices(
     return choices
 
 
-def _choice(player: Player, proposed: Any, seen: Any, reader: ActionReader) -> Choice:
-    choice = Choice(reader.read(proposed)[0].copy())
+def _choice(player: EpisodePlayer, proposed: Any, seen: Any, reader: ActionReader) -> ChosenAction:
+    choice = ChosenAction(reader.read(proposed)[0].copy())
     if player.takeover is not None and (instead := player.takeover(seen)) is not None:
-        choice = Choice(_read(instead, reader, "takeover"), 1)
+        choice = ChosenAction(_read(instead, reader, "takeover"), 1)
     if player.corrector is not None:
         choice = choice._replace(correction=_read(player.corrector(seen), reader, "corrector"))
     return choice
@@ -271,7 +280,7 @@ def _read(action: Any, reader: ActionReader, whose: str) -> Row:
 
 
 @contextmanager
-def _own_generators(player: Player, *, shared: bool) -> Generator[None]:
+def _own_generators(player: EpisodePlayer, *, shared: bool) -> Generator[None]:
     """Let the random generators go on where the player's were, if others draw from them, too."""
     if not shared:
         yield
@@ -302,3 +311,146 @@ def _rows(tree: Any, rows: Sequence[int]) -> Any:
     if isinstance(tree, dict):
         return {key: _rows(value, rows) for key, value in tree.items()}
     return tree[torch.tensor(rows)]
+
+
+@dataclass(frozen=True)
+class Cast:
+    """Who may act in episodes; can be pickled if they can.
+
+    Attributes:
+        policy: Who plays, a `Policy`; None if the expert does.
+        expert: An expert, or None.
+        takeover: May act in place of the policy, or None.
+        corrector: Says what it would do, or None.
+        to_the_end: Whether an expert's plan is carried out to its end, whatever happens.
+    """
+
+    policy: Any = None
+    expert: Expert | None = None
+    takeover: Any = None
+    corrector: Any = None
+    to_the_end: bool = False
+
+    @property
+    def members(self) -> tuple[Any, ...]:
+        """All of them."""
+        return self.policy, self.expert, self.takeover, self.corrector
+
+
+def cast_of(policy: Policy | str, task: type[MultiRobotTask]) -> tuple[Cast, str | None]:
+    """Return who plays, and by which name ``module:name`` that was imported, if it was.
+
+    Args:
+        policy: A policy, the name of one, or the word ``"expert"``.
+        task: What is played.
+
+    Raises:
+        TaskError: If that is not a policy, or the task has no expert.
+    """
+    name = policy if isinstance(policy, str) else None
+    if name == EXPERT:
+        return Cast(expert=find_expert(task.task_id)), None
+    return Cast(check_policy(policy if name is None else find_policy(name))), name
+
+
+class Casting:
+    """Makes the players of the episodes of one task."""
+
+    def __init__(self, cast: Cast, env: TaskEnv) -> None:
+        """Prepare for plans if an expert plays.
+
+        Args:
+            cast: Who may act.
+            env: Where it is played; experts that plan leave it alone.
+        """
+        self._cast, self._env = cast, env
+        self._own: TaskEnv | None = None
+        self._planner: Planner | None = None
+        if cast.expert is not None:
+            if env.num_envs > 1:
+                self._own = env.task_class(replace(env.scenario, num_envs=1))
+            self._planner = Planner(self._own or env, cast.expert)
+
+    def __call__(self, seed: int) -> EpisodePlayer:
+        """Return who plays the episode of a seed; the random generators begin with it."""
+        seed_all(seed)
+        if self._planner is not None:
+            return self._follower(self._planner, seed)
+        cast = self._cast
+        return EpisodePlayer(
+            seed,
+            _fresh(cast.policy),
+            self._env.max_episode_steps,
+            random_states(),
+            takeover=_fresh(cast.takeover),
+            corrector=_fresh(cast.corrector),
+        )
+
+    def close(self) -> None:
+        """Let the worlds of its own go."""
+        for own in (self._planner, self._own):
+            if own is not None:
+                own.close()
+
+    def _follower(self, planner: Planner, seed: int) -> EpisodePlayer:
+        """Return what carries out the expert's plan; nothing if it finds none."""
+        try:
+            plan = planner(seed)
+        except TaskError as error:
+            return EpisodePlayer(seed, open_loop(()), 0, random_states(), str(error))
+        to_the_end = self._cast.to_the_end
+        states, reason = random_states(), planner.reason
+        player = EpisodePlayer(seed, open_loop(plan), len(plan), states, reason, True, to_the_end)
+        if planner.rehearsed is not None and (to_the_end or _ends_at_last(planner.rehearsed)):
+            player.rehearsed = planner.rehearsed
+        return player
+
+
+def _ends_at_last(episode: PlayedEpisode) -> bool:
+    """Tell whether no step but the last ended an episode or was out of time."""
+    return not (episode.terminated | episode.truncated)[:-1].any()
+
+
+def _fresh(policy: Any) -> Any:
+    """Return a copy of a policy as it was passed; people and what is batched are not copied."""
+    return policy if is_batched(policy) or is_person(policy) else deepcopy(policy)
+
+
+@dataclass(frozen=True)
+class EpisodesJob:
+    """Everything but the seed that decides episodes of one task; can be pickled.
+
+    Attributes:
+        task: Class of the task.
+        scenario: How to make it.
+        cast: Who plays.
+        together: Seeds that are played at once, by the first of them.
+    """
+
+    task: type[MultiRobotTask]
+    scenario: Scenario
+    cast: Cast
+    together: Mapping[int, tuple[int, ...]]
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """What other machines may need to play it."""
+        return modules_of(self.task, *self.cast.members)
+
+
+AnyJob = TypeVar("AnyJob", bound=EpisodesJob)
+
+
+class EpisodesPlay(Generic[AnyJob]):
+    """Plays the episodes of a job in a worker, in worlds that are built anew for each."""
+
+    def __init__(self, job: AnyJob) -> None:
+        """Make the task."""
+        torch.set_num_threads(1)  # sums are the same everywhere, and other workers want the cores
+        self._job, self._env = job, job.task(job.scenario)
+        self._casting = Casting(job.cast, self._env)
+
+    def close(self) -> None:
+        """Let the worlds go."""
+        self._env.close()
+        self._casting.close()

@@ -14,8 +14,9 @@ import os
 import posixpath
 import threading
 import time
+import zipfile
 import zlib
-from collections.abc import Collection, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from os import PathLike
@@ -26,6 +27,7 @@ import pyfive
 from numpy.typing import NDArray
 
 from robot_layouts.core.files import open_regular
+from robots import RobotLayoutsError
 
 MAX_BYTES = 2**30  # of one episode's arrays
 MAX_ARRAYS = 10_000  # of one episode
@@ -55,6 +57,10 @@ _UNKNOWN = "something in it is damaged, or is not read, such as links to other f
 _FLAG = {"FALSE": 0, "TRUE": 1}  # the enumeration that h5py writes for bool
 
 Shapes = dict[str, tuple[int, ...]]
+_ERRORS = (
+    *(OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError),
+    *(MemoryError, EOFError, zlib.error, zipfile.BadZipFile),
+)
 
 
 class ContentError(ValueError):
@@ -336,7 +342,7 @@ def _read(array: Any) -> NDArray[Any]:
     """Return the numbers of an array.
 
     Raises:
-        ContentError: If a chunk of it unpacks to more than it declares, or a flag is none.
+        ContentError: If a chunk of it unpacks to more than it declares, or a flag is not 0 or 1.
     """
     flags = _PYFIVE.check_enum_dtype(array.dtype) is not None
     if not _bytes_of(array):
@@ -370,3 +376,18 @@ def _text(name: str, value: Any) -> str:
     if not isinstance(value, (bytes, str)):
         raise ContentError(f"its attribute {name} is not a text")
     return value.decode() if isinstance(value, bytes) else value
+
+
+@contextmanager
+def damage_errors(refusal: Callable[[str], RobotLayoutsError]) -> Generator[None]:
+    """Turn what h5py, NumPy and others raise while they read a file into one of our errors.
+
+    Args:
+        refusal: Makes the error, given the reason.
+    """
+    try:
+        yield
+    except RobotLayoutsError:
+        raise
+    except _ERRORS as error:
+        raise refusal(str(error) or repr(error)) from error

@@ -1,7 +1,8 @@
 """Where episodes come from, as plain data that can be compared and that their recording keeps.
 
 What an episode depends on besides its seed and actions, who acted, and its checksum. The recorder
-writes it, the reader reads it.
+writes it, the reader reads it. Robots that were guessed from a user's own URDF or MJCF are named by
+that file.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ import hashlib
 import json
 import zlib
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from typing_extensions import NotRequired, TypedDict
 
 from layouts import Layout
-from robot_layouts.core.files import parse_json
+from robot_layouts.core.files import parse_json, read_regular
 from robot_layouts.core.schema import (
     AnyText,
     FieldError,
@@ -29,16 +31,52 @@ from robot_layouts.core.schema import (
     length,
     whole,
 )
-from robot_layouts.data.reading.guessed_robots import describe_guessed
-from robot_layouts.data.reading.manifest import FILE_NUMBER
-from robots import CONTROL_MODES, JointGroup
+from robot_layouts.data.reading.json_files import FILE_NUMBER, TrajectoryError
+from robots import (
+    CONTROL_MODES,
+    JointGroup,
+    LocalMjcf,
+    LocalUrdf,
+    NativeAgent,
+    RobotDescriptor,
+    RobotRegistry,
+    UnreadableFileError,
+)
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_fingerprint
+from robots.mjcf.locator import is_mjcf
+from robots.urdf.cleaning.cleaning import is_template
+from robots.urdf.summary import MAX_URDF_BYTES
 from tasks import TaskEnv
 from tasks.native.format import observation_keys
 from tasks.registry import full_name
 
 _ACTION_NUMBERS = 10_000  # of all robots
+# What an episode consists of, in its group of an h5 file.
+CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
+STATES = "env_states/"
+ARRAYS = (
+    "actions",
+    STATES.rstrip("/"),
+    "rewards",
+    "success",
+    "terminated",
+    "truncated",
+    "actor",
+    "corrections",
+)
+TEXTS = ("action_split", "episode")
+
+# What may change from one resumption to the next, and what earlier versions did not write.
+NOT_COMPARED = ("source_type", "source_desc", "guessed", FILE_NUMBER)
+
+_SHOWN = 4  # differences that a message names
+_ABSENT = "nothing"
+
+# Fields that digests of 0.2.0 lack, with their defaults.
+NEWER_FIELDS = {"no_floor_contact": (), "native_agent": NativeAgent()}
+# The same of joint groups and fingers, as they are written.
+NEWER_IN_PARTS = (", approximate_ik=False", ", opening_axes=((0.0, 1.0, 0.0), (0.0, 1.0, 0.0))")
 
 
 # What `describe_layout` and `describe_simulation` write, as far as it is read again.
@@ -62,27 +100,6 @@ class _Simulation(TypedDict, total=False):
 
 LAYOUT = dict[str, _Place] | None
 SIMULATION = _Simulation | None
-
-# What an episode consists of, in its group of an h5 file.
-CHECKSUM = "checksum"  # attribute of an episode's group in the h5 file
-STATES = "env_states/"
-ARRAYS = (
-    "actions",
-    STATES.rstrip("/"),
-    "rewards",
-    "success",
-    "terminated",
-    "truncated",
-    "actor",
-    "corrections",
-)
-TEXTS = ("action_split", "episode")
-
-# What may change from one resumption to the next, and what earlier versions did not write.
-NOT_COMPARED = ("source_type", "source_desc", "guessed", FILE_NUMBER)
-
-_SHOWN = 4  # differences that a message names
-_ABSENT = "nothing"
 
 
 def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
@@ -289,3 +306,106 @@ def recorded_control_mode(task: TaskEnv) -> str | dict[str, str]:
     if None in keys.values() or set(by_arm) != set(task.layout):
         return by_arm
     return {str(keys[robot]): own for robot, own in by_arm.items()}
+
+
+class _Guessed(TypedDict):
+    urdf: AnyText
+    sha256: AnyText
+    descriptor: AnyText
+
+
+GUESSED = dict[str, _Guessed] | None
+
+
+def describe_guessed(layout: Layout) -> dict[str, dict[str, str]]:
+    """Return, by place, the URDF of each robot that no registry knows, and what is made of it.
+
+    Each has ``urdf``, the file's absolute path, its ``sha256``, and ``descriptor``, a SHA-256 over
+    the descriptor's other fields. Robots that are registered, or made of several files, are not
+    among them.
+
+    Raises:
+        UnreadableFileError: If a URDF cannot be read.
+    """
+    return {
+        place: {
+            "urdf": str(path),
+            "sha256": _checksum(path),
+            "descriptor": descriptor_digest(placement.robot),
+        }
+        for place, placement in layout.items()
+        if (path := _own_file(placement.robot)) is not None
+    }
+
+
+def guess_again(place: str, recorded: Mapping[str, str], name: str) -> RobotDescriptor:
+    """Return the robot of a recording, guessed from the same file.
+
+    The file is parsed only if it has the recorded checksum, so that another person's recording
+    makes nothing of other files. A xacro template is not expanded: it is a program.
+
+    Args:
+        place: Its place.
+        recorded: What `describe_guessed` returned of it.
+        name: Its name.
+
+    Raises:
+        TrajectoryError: If the file, or what is guessed from it, is another one, or a template.
+    """
+    path = Path(recorded["urdf"])
+    helps = f"name the robot, with --robots {place}=… or robots={{{place!r}: …}}"
+    try:
+        contents = read_regular(path, MAX_URDF_BYTES)
+    except UnreadableFileError as error:
+        raise TrajectoryError(
+            f"the robot of {place!r} was guessed from {path}, which cannot be read"
+            f" ({error.strerror}); {helps}"
+        ) from error
+    if hashlib.sha256(contents).hexdigest() != recorded["sha256"]:
+        raise TrajectoryError(
+            f"the robot of {place!r} was guessed from {path}, which has changed since; {helps}"
+        )
+    if not is_mjcf(path) and is_template(contents, str(path)):
+        raise TrajectoryError(
+            f"the robot of {place!r} was guessed from {path}, a xacro template, which is a"
+            f" program and does not run because a file names it; {helps}"
+        )
+    robot = RobotDescriptor.from_urdf(path, name, quiet=True)
+    if descriptor_digest(robot) != recorded["descriptor"]:
+        raise TrajectoryError(
+            f"the robot of {place!r} is not what is guessed from {path} now, with this version of"
+            f" the library and these packages, or fields of it were given; {helps}"
+        )
+    return robot
+
+
+def _own_file(robot: RobotDescriptor) -> Path | None:
+    if not isinstance(robot.urdf, LocalUrdf | LocalMjcf):
+        return None
+    if robot.name in RobotRegistry.names() and RobotRegistry.load(robot.name) == robot:
+        return None
+    path = Path(robot.urdf.path).expanduser().absolute()
+    if is_mjcf(path) != isinstance(robot.urdf, LocalMjcf):
+        return None  # which its path alone does not tell
+    return path if path.is_file() else None  # and no template with arguments
+
+
+def _checksum(path: Path) -> str:
+    return hashlib.sha256(read_regular(path, MAX_URDF_BYTES)).hexdigest()
+
+
+def descriptor_digest(robot: RobotDescriptor) -> str:
+    """Return a SHA-256, in hex, over all fields of a descriptor but where its files are.
+
+    Newer fields count where they differ from their defaults, so that older digests stay.
+    """
+    counted = [f.name for f in fields(robot) if f.compare and f.name != "urdf"]
+    values = {name: getattr(robot, name) for name in counted}
+    for name, default in NEWER_FIELDS.items():
+        if values[name] == default:
+            del values[name]
+    values["keyframes"] = dict(robot.keyframes)
+    written = repr(values)
+    for default in NEWER_IN_PARTS:
+        written = written.replace(default, "")
+    return hashlib.sha256(written.encode()).hexdigest()

@@ -7,9 +7,9 @@ from typing import Any
 
 from layouts import Layout, Placement
 from layouts.placement import RobotLike
-from robot_layouts.data.reading.guessed_robots import guess_again
+from robot_layouts.data.reading.json_files import TrajectoryError
+from robot_layouts.data.reading.provenance import guess_again
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.reading.summary import TrajectoryError
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 from tasks import MultiRobotTask, TaskEnv, get_task_class, make
 from tasks.language.needs import ACT, HOLD

@@ -16,13 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.files import open_regular
-from robot_layouts.data.reading.damage import damage_errors
-from robot_layouts.data.reading.guessed_robots import GUESSED
-from robot_layouts.data.reading.hdf5 import Hdf5File, Shapes
-from robot_layouts.data.reading.manifest import SUFFIX, file_path, manifest_path, read_manifest
+from robot_layouts.data.reading.hdf5 import Hdf5File, Shapes, damage_errors
+from robot_layouts.data.reading.json_files import (
+    MAX_STEPS,
+    SUFFIX,
+    EpisodeEntry,
+    OwnEpisode,
+    TrajectoryError,
+    file_path,
+    manifest_path,
+    read_manifest,
+    read_summary,
+    seeds_of,
+)
 from robot_layouts.data.reading.provenance import (
     ARRAYS,
     CHECKSUM,
+    GUESSED,
     LAYOUT,
     SIMULATION,
     STATES,
@@ -35,19 +45,10 @@ from robot_layouts.data.reading.provenance import (
     listing,
     read_described,
 )
-from robot_layouts.data.reading.summary import (
-    MAX_STEPS,
-    Entry,
-    OwnEpisode,
-    TrajectoryError,
-    read_summary,
-)
 from robots import UnreadableFileError, closest_match
 from tasks import TaskEnv
 from tasks.episode import States
 from tasks.native.controllers import CONTROLLER
-
-__all__ = ["Recording", "Trajectory", "TrajectoryError", "all_files", "expect_file", "first_file"]
 
 FILE = "trajectory.h5"
 
@@ -64,7 +65,7 @@ class Trajectory:
     Attributes:
         episode_id: Its number in the file.
         seed: Seed of its reset; None if the file names none, or several.
-        control_mode: See `robot_layouts.data.reading.summary.Summary`.
+        control_mode: See `robot_layouts.data.reading.json_files.RecordingSummary`.
         actions: Flat actions, (T, A).
         states: State dict of `TaskEnv.get_state_dict`, each entry (T + 1, k), the first
             row being the state after the reset; None if the file holds none.
@@ -120,7 +121,7 @@ class Recording(Sequence[Trajectory]):
         env_kwargs: What native's environment was made with.
         source_type: Where the actions come from, in ManiSkill's words, or None.
         layout: What `describe_layout` wrote; None in native's files.
-        guessed: What `robot_layouts.data.reading.guessed_robots.describe_guessed` wrote, or None.
+        guessed: What `robot_layouts.data.reading.provenance.describe_guessed` wrote, or None.
         simulation: What `describe_simulation` wrote; None in native's
             files.
         action_split: Robot name → slice of the flat action; None in native's files.
@@ -157,8 +158,8 @@ class Recording(Sequence[Trajectory]):
         self.seeds, counts = first.seeds, [len(first.entries)]
         if self.manifest is not None:
             self._expect_listed(0, first)
-            self.seeds = tuple(seed for file in self.manifest.files for seed in file.seeds)
-            counts = [file.episodes for file in self.manifest.files]
+            self.seeds = tuple(seed for file in self.manifest.files for seed in seeds_of(file))
+            counts = [file["episodes"] for file in self.manifest.files]
         self._starts = [0, *accumulate(counts)]
 
     def __enter__(self) -> Recording:
@@ -293,7 +294,7 @@ class Recording(Sequence[Trajectory]):
     def _expect_listed(self, number: int, file: _File) -> None:
         """Refuse a file with other episodes than the manifest says."""
         assert self.manifest is not None  # one file alone has no others
-        if list(file.seeds) != self.manifest.files[number].seeds:
+        if list(file.seeds) != seeds_of(self.manifest.files[number]):
             file.hdf5.close()
             raise TrajectoryError(
                 f"{file.path} does not hold the episodes that {manifest_path(self.path)} lists;"
@@ -323,7 +324,7 @@ class _File:
                 "guessed": read_described(described, "guessed", GUESSED),
             }
 
-    def read(self, entry: Entry) -> Trajectory:
+    def read(self, entry: EpisodeEntry) -> Trajectory:
         texts = self.texts(entry)
         self._expect_shapes(entry, self.shapes(entry, ARRAYS))
         with self._damage(entry.group):
@@ -351,7 +352,7 @@ class _File:
             reason=entry.reason,
         )
 
-    def texts(self, entry: Entry) -> dict[str, str]:
+    def texts(self, entry: EpisodeEntry) -> dict[str, str]:
         """Return the attributes of an episode that say what it is, if it has any."""
         with self._damage(entry.group):
             texts = self.hdf5.texts(entry.group, (*TEXTS, CHECKSUM))
@@ -366,12 +367,12 @@ class _File:
             )
         return texts
 
-    def shapes(self, entry: Entry, names: Collection[str]) -> Shapes:
+    def shapes(self, entry: EpisodeEntry, names: Collection[str]) -> Shapes:
         """Return the shapes of an episode's arrays, whose numbers are not read."""
         with self._damage(entry.group):
             return self.hdf5.shapes(entry.group, names)
 
-    def action_shape(self, entry: Entry, shapes: Shapes) -> tuple[int, int]:
+    def action_shape(self, entry: EpisodeEntry, shapes: Shapes) -> tuple[int, int]:
         """Return (T, A), after a look whether T is what the json says."""
         shape = shapes.get("actions")
         if shape is None:
@@ -388,7 +389,7 @@ class _File:
             )
         return shape
 
-    def _expect_shapes(self, entry: Entry, shapes: Shapes) -> None:
+    def _expect_shapes(self, entry: EpisodeEntry, shapes: Shapes) -> None:
         steps, numbers = self.action_shape(entry, shapes)
         for name, shape in shapes.items():
             if name == "corrections" and shape != (steps, numbers):
@@ -404,7 +405,7 @@ class _File:
                 what = f"its states of {name.rpartition('/')[2]} have shape {shape}"
                 self.refuse(entry, f"{what}, not ({steps + 1}, k)")
 
-    def _expect_numbers(self, entry: Entry, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def _expect_numbers(self, entry: EpisodeEntry, arrays: Mapping[str, NDArray[Any]]) -> None:
         if arrays["actions"].dtype.kind != "f" or not np.isfinite(arrays["actions"]).all():
             self.refuse(entry, "its actions are not all finite floating-point numbers")
         for name, rows in arrays.items():
@@ -415,7 +416,7 @@ class _File:
         if actor is not None and (actor.dtype != np.uint8 or (actor >= actors).any()):
             self.refuse(entry, f"its actor is not at each step one of the {actors} of its source")
 
-    def refuse(self, entry: Entry, why: str) -> NoReturn:
+    def refuse(self, entry: EpisodeEntry, why: str) -> NoReturn:
         raise TrajectoryError(f"{entry.group} of {self.path} cannot be played: {why}")
 
     def _damage(self, what: str) -> AbstractContextManager[None]:

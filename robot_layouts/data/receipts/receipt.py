@@ -31,8 +31,8 @@ from robot_layouts.core.schema import (
     whole,
 )
 from robot_layouts.core.writing import write_whole
-from robot_layouts.data.playing.state_trace import BYTES
-from robot_layouts.data.reading.summary import MAX_SEED, MAX_STEPS
+from robot_layouts.data.playing.evaluation_job import BYTES
+from robot_layouts.data.reading.json_files import MAX_SEED, MAX_STEPS
 from robots import RobotLayoutsError, UnreadableFileError
 
 FORMAT = "robot-layouts receipt 1"
@@ -139,7 +139,7 @@ class Receipt:
         policy: ``kind`` (``expert`` or ``policy``), ``name`` (``module:name``), ``sha256`` of its
             module's source, and more; see `robot_layouts.data.receipts.provenance.describe_policy`.
         making: What the task was made with: its ``layout`` with the checksums of robot files, and
-            more; see `robot_layouts.data.receipts.making.describe_making`.
+            more; see `robot_layouts.data.receipts.provenance.describe_making`.
         environment: ``versions`` and ``processor`` of where it was played; see
             `environment`. ``others``, if workers differed; ``guessed``, where the
             files of robots were that no registry knows; ``variables``, names of environment

@@ -8,19 +8,23 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+import torch
 
+from robot_layouts.core.cli import Folder
+from robot_layouts.core.commands import printable
+from robot_layouts.core.progress import Progress
+from robot_layouts.data.playing.command_options import ControlMode, RecordingOption
 from robot_layouts.data.playing.mode_conversion import converted_steps, why_lost
-from robot_layouts.data.playing.replay import FILE, task_for
-from robot_layouts.data.reading.recording import Recording, Trajectory
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.recorder import Recorder
-from tasks.episode import PlayedEpisode, play
+from robots import RecordingError
+from tasks.episode import play
 
 
 @dataclass
 class Conversion:
-    """What came of converting a recording.
+    """The result of converting a recording.
 
     Attributes:
         path: Where it is.
@@ -64,7 +68,7 @@ def convert(
 ) -> Conversion:
     """Record the successful episodes of a recording in another control mode.
 
-    Who acted is kept; what a corrector would have done is not, as nobody played it.
+    Who acted is kept; what a corrector would have done is not, as it was not played.
 
     Args:
         file: The recording.
@@ -77,7 +81,7 @@ def convert(
 
     Raises:
         TrajectoryError: If the recording cannot be played here.
-        TaskError: If the mode is none.
+        TaskError: If there is no such mode.
         RecordingError: If the folder cannot be written or holds a recording of something else.
     """
     with closing(task_for(file, **(cell or {}))) as source:
@@ -105,7 +109,8 @@ def convert(
                     actions, steps = converted_steps(source, episode.seed, episode.actions, task)
                     played = play(task, episode.seed, actions)
                     if played.solved:
-                        recorder.add(_signed(played, episode, steps))
+                        actor = None if episode.actor is None else episode.actor[steps]
+                        recorder.add(replace(played, source=episode.source, actor=actor))
                         found.kept.append(episode.seed)
                     else:
                         found.lost.append(episode.seed)
@@ -116,13 +121,37 @@ def convert(
     return found
 
 
-def _signed(played: PlayedEpisode, episode: Trajectory, steps: NDArray[np.intp]) -> PlayedEpisode:
-    """Write into an episode who acted in the one that it was made from.
+def convert_command(
+    recording: RecordingOption, *, to: ControlMode, out: Folder, episodes: int | None = None
+) -> int:
+    """Record the episodes of a recording again in another control mode.
+
+    Each episode is played in its own mode and in the other, and kept if it succeeds there too.
+    Those that did not succeed when they were recorded are left out. Exit code: 0 if all others were
+    kept, 1 if not, 2 for bad usage.
 
     Args:
-        played: The episode.
-        episode: The one that it was made from.
-        steps: Which step of that each of its own stands for.
+        recording: The recording.
+        to: The other mode.
+        out: Folder of trajectory.h5 and .json.
+        episodes: Convert the first N episodes (all).
+
+    Raises:
+        RobotLayoutsError: If the recording cannot be played or the other not be written.
     """
-    actor = None if episode.actor is None else episode.actor[steps]
-    return replace(played, source=episode.source, actor=actor)
+    torch.set_num_threads(1)
+    with recording.open() as file:
+        count = recording.count(file, episodes)
+        if not count:
+            raise RecordingError(f"{file.path} has no episodes to convert")
+        with Progress(count, "episodes") as line:
+            summary = convert(
+                file,
+                to,
+                out,
+                count,
+                recording.cell.making(),
+                lambda: line.advance(1, "converting"),
+            )
+    print(printable(str(summary)))
+    return 0 if summary.complete else 1

@@ -31,8 +31,14 @@ def claim(folder: Path, *, certain: bool = False) -> int | None:
         does too; None if another process holds it.
     """
     while True:
-        folder.mkdir(exist_ok=True)
-        descriptor = os.open(folder, os.O_RDONLY)
+        with suppress(FileExistsError):
+            folder.mkdir()
+        try:
+            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        except FileNotFoundError:  # whoever held the lock has just removed the folder
+            if folder.is_symlink():
+                raise
+            continue
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -46,7 +52,7 @@ def claim(folder: Path, *, certain: bool = False) -> int | None:
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(descriptor), folder.stat()):
                 return descriptor
-        os.close(descriptor)  # another process removed the folder meanwhile
+        os.close(descriptor)  # the folder was removed after it was opened
 
 
 class DiskFile(FileIO):

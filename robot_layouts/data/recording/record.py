@@ -14,42 +14,46 @@ import tasks
 from layouts import Layout
 from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import as_ours
-from robot_layouts.data.playing.casting import Cast, Casting
-from robot_layouts.data.playing.executor import (
-    EPISODE_SECONDS,
-    Event,
-    Executor,
-    WorkerError,
-    WorkersDied,
-    choose_executor,
-    modules_of,
-    play_all,
-)
-from robot_layouts.data.playing.seeds import checked_seeds
-from robot_layouts.data.playing.together import BatchError, grouped, one_by_one, record_together
-from robot_layouts.data.reading.provenance import describe_layout, differences, listing
-from robot_layouts.data.recording.episode_files import PartEncoder
-from robot_layouts.data.recording.recorder import FILE_SIZE, Recorder
-from robot_layouts.data.sources import actors as kinds
-from robot_layouts.data.sources.actors import (
+from robot_layouts.data.actors import (
     DESCRIPTION,
+    EXPERT,
+    PERSON,
+    POLICY,
     TYPE,
     Actor,
     actor_of,
+    check_policy,
     combined,
     episode_source,
+    find_policy,
 )
-from robot_layouts.data.sources.policies import EXPERT, check_policy, find_policy
+from robot_layouts.data.playing.executor import Executor, choose_executor, play_all
+from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event, WorkersDied
+from robot_layouts.data.playing.seeds import checked_seeds
+from robot_layouts.data.playing.together import (
+    BatchError,
+    Cast,
+    EpisodesJob,
+    EpisodesPlay,
+    grouped,
+    one_by_one,
+    record_together,
+)
+from robot_layouts.data.reading.json_files import FILE_SIZE
+from robot_layouts.data.reading.provenance import describe_layout, differences, listing
+from robot_layouts.data.reading.recording import FILE
+from robot_layouts.data.recording.episode_files import PartEncoder
+from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts import find_expert
 from robots import RecordingError, TaskError
-from tasks import MultiRobotTask, Scenario
+from tasks import MultiRobotTask
 from tasks.episode import PlayedEpisode, Policy, Score
 from tasks.randomization.declaration import Randomization
 from tasks.registry import make_scenario
 
-FILE = "trajectory.h5"
-_TYPES = {kinds.EXPERT: "scripted", kinds.POLICY: "policy", kinds.PERSON: "human"}
+_TYPES = {EXPERT: "scripted", POLICY: "policy", PERSON: "human"}
 LOST_IN_A_ROW = 10  # episodes that workers died of, and none that was played, until all ends
 
 
@@ -80,7 +84,7 @@ class Actors:
 
         Raises:
             TaskError: If the task has no expert, something cannot be imported or called, or
-                somebody is to take over from an expert, who does not look.
+                there is a takeover for an expert, whose plan ignores observations.
             RecordingError: If a policy's file cannot be read.
         """
         if isinstance(policy, str) and policy == EXPERT:
@@ -91,7 +95,7 @@ class Actors:
                 )
             expert = find_expert(task.task_id)
             module, name = (getattr(expert, n, "") for n in ("__module__", "__qualname__"))
-            described = Actor(kinds.EXPERT, f"{module}:{name or expert}")
+            described = Actor(EXPERT, f"{module}:{name or expert}")
             return Cast(expert=expert, to_the_end=True), Actors((described,))
         acting, who = _found(policy, "policy")
         taking, taker = _found(takeover, "takeover")
@@ -108,7 +112,7 @@ class Actors:
 
     def sign(self, episode: PlayedEpisode) -> PlayedEpisode:
         """Write into an episode who acted in it; an expert's says so in the header alone."""
-        if self.actors[0].kind == kinds.EXPERT:
+        if self.actors[0].kind == EXPERT:
             return replace(episode, actor=None)
         turns = episode.actor
         assert turns is not None  # whoever plays keeps them
@@ -117,29 +121,16 @@ class Actors:
 
 
 @dataclass(frozen=True)
-class EpisodeJob:
-    """Everything but the seed that decides an episode; can be pickled.
+class EpisodeJob(EpisodesJob):
+    """Episodes that are recorded.
 
     Attributes:
-        task: Class of the task.
-        scenario: How to make it.
-        cast: Who plays.
-        actors: Who that is, as the recording keeps it.
+        actors: Who plays, as the recording keeps it.
         encoder: What encodes finished episodes.
-        together: Seeds that are played at once, by the first of them.
     """
 
-    task: type[MultiRobotTask]
-    scenario: Scenario
-    cast: Cast
     actors: Actors
     encoder: PartEncoder
-    together: Mapping[int, tuple[int, ...]]
-
-    @property
-    def modules(self) -> tuple[str, ...]:
-        """What other machines may need to play it."""
-        return modules_of(self.task, *self.cast.members)
 
     def __call__(self) -> Callable[[int], dict[int, Recorded | str]]:
         """Make the task in a worker, and return what plays and encodes the episodes of seeds.
@@ -147,17 +138,19 @@ class EpisodeJob:
         Raises:
             RecordingError: If the robot files of this machine are not those of the recording.
         """
-        torch.set_num_threads(1)  # the tensors are small, and other workers want the cores
         return _Play(self)
 
 
-class _Play:
-    """Plays episodes in worlds that are built anew for each, and encodes them."""
+class _Play(EpisodesPlay[EpisodeJob]):
+    """Plays episodes, and encodes them."""
 
     def __init__(self, job: EpisodeJob) -> None:
-        self._job, self._env = job, job.task(job.scenario)
-        self._expect_same_robots()
-        self._casting = Casting(job.cast, self._env)
+        super().__init__(job)
+        here = describe_layout(self._env.layout)
+        if found := differences(job.encoder.header["layout"], here):
+            raise RecordingError(
+                f"a worker would record something else than this recording is of ({listing(found)})"
+            )
 
     def __call__(self, seed: int) -> dict[int, Recorded | str]:
         """Play and encode the episodes of a seed and of those that are played together with it.
@@ -175,11 +168,6 @@ class _Play:
                 raise
         return {seed: self._alone(seed) for seed in seeds}  # one of them must not cost the others
 
-    def close(self) -> None:
-        """Let the worlds go."""
-        self._env.close()
-        self._casting.close()
-
     def _play(self, seeds: Sequence[int]) -> dict[int, Recorded | str]:
         players = [self._casting(seed) for seed in seeds]
         with torch.no_grad():
@@ -195,18 +183,10 @@ class _Play:
         except Exception as error:
             return str(as_ours(error))
 
-    def _expect_same_robots(self) -> None:
-        header = self._job.encoder.header
-        found = differences(header["layout"], describe_layout(self._env.layout))
-        if found:
-            raise RecordingError(
-                f"a worker would record something else than this recording is of ({listing(found)})"
-            )
-
 
 @dataclass
 class Summary:
-    """What came of a recording.
+    """The result of a recording.
 
     Attributes:
         recorded: Episodes in the file in the end.
@@ -322,7 +302,7 @@ def record(
         recorder.expect(missing)
         together = grouped(missing, num_envs)
         at_once = replace(scenario, num_envs=max(map(len, together.values()), default=1))
-        job = EpisodeJob(cls, at_once, cast, actors, recorder.encoder, together)
+        job = EpisodeJob(cls, at_once, cast, together, actors, recorder.encoder)
         try:
             with closing(play_all(executor, job, list(together))) as events:
                 for event in _of_episodes(events, together):

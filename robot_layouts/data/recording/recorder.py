@@ -3,46 +3,308 @@
 from __future__ import annotations
 
 import glob
+import json
 import math
 import os
 import re
 import weakref
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from types import TracebackType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from robot_layouts.core.writing import PARTIAL
-from robot_layouts.data.reading.manifest import FILE_SIZE
+from robot_layouts.core.files import open_regular, read_text
+from robot_layouts.core.writing import PARTIAL, write_whole
+from robot_layouts.data.actors import Source, combined, source_of
+from robot_layouts.data.reading.hdf5 import Hdf5File, damage_errors
+from robot_layouts.data.reading.json_files import (
+    FILE_NUMBER,
+    FILE_SIZE,
+    MAX_JSON,
+    FileEntry,
+    RecordingManifest,
+    TrajectoryError,
+    file_path,
+    manifest_path,
+    manifest_text,
+    matches,
+    read_manifest,
+    seeds_of,
+    sized_file,
+    spans_of,
+)
 from robot_layouts.data.reading.provenance import (
-    describe_layout,
     describe_task,
     header_differences,
+    header_hash,
     listing,
+    numbered,
     recorded_control_mode,
 )
 from robot_layouts.data.recording.disk import claim, disk_errors
 from robot_layouts.data.recording.episode_files import (
+    JoinedEpisode,
     PartEncoder,
+    Stored,
+    damaged_recording,
+    join,
     list_parts,
     part_path,
     part_size,
+    read_header,
+    read_joined,
+    read_joined_episode,
     read_part,
     refuse_foreign,
     seed_of,
     write_part,
 )
-from robot_layouts.data.recording.joined_files import JoinedFiles, OpenFile
-from robot_layouts.data.sources.actors import Source, combined, source_of
-from robots import RecordingError, TaskError
+from robots import RecordingError, TaskError, UnreadableFileError
 from tasks import TaskEnv
 from tasks.episode import PlayedEpisode
 
-__all__ = ["FILE_SIZE", "Recorder", "describe_layout"]
+
+@dataclass
+class OpenFile:
+    """A file of a recording that may have to be written anew.
+
+    Attributes:
+        number: Which file; see `robot_layouts.data.reading.json_files.file_path`.
+        episodes: Its episodes by seed, ascending.
+        sources: What its header says of its source, unless it is empty.
+        lost: Seeds of episodes that it held, and that are damaged.
+        whole: Whether there is nothing to mend in the h5 file.
+    """
+
+    number: int
+    episodes: dict[int, JoinedEpisode] = field(default_factory=dict[int, JoinedEpisode])
+    sources: frozenset[Source] = frozenset()
+    lost: frozenset[int] = frozenset()
+    whole: bool = False
+
+
+class JoinedFiles:
+    """The files of a recording: full ones, which stay as they are, and a last one that may grow.
+
+    Full files that are as the manifest says are not read again.
+
+    Attributes:
+        manifest: Where the manifest is.
+        paths: The h5 files that are there, or that the manifest lists, the first one first.
+        last: The last file.
+        mending: Full files of which episodes are damaged, by number.
+        seeds: Seeds of the episodes of all files.
+        damaged: What is damaged, in words.
+    """
+
+    def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
+        """Find the files.
+
+        Args:
+            path: The first h5 file of a recording.
+            header: What its episodes have in common.
+
+        Raises:
+            RecordingError: If another recording has the name of one.
+        """
+        self._path, self._header, self.manifest = path, header, manifest_path(path)
+        self._entries: list[FileEntry] = []  # of the full files
+        self._last_entry: FileEntry | None = None
+        self.last = OpenFile(0)
+        self.mending: dict[int, OpenFile] = {}
+        self.seeds = set[int]()
+        self.damaged: list[str] = []
+        self._listed = self._read_manifest()
+        self.paths = self._find()
+
+    def read(self) -> None:
+        """Check what is there; files that a kill left half noted are noted.
+
+        Raises:
+            RecordingError: If it is of something else, or no recording.
+        """
+        for number, path in enumerate(self.paths):
+            entry = self._listed[number] if number < len(self._listed) else None
+            if number + 1 == len(self.paths):
+                self.last = self._read_all(number, path, entry)
+            elif entry is not None and matches(entry, path):
+                self._entries.append(entry)
+                self._note_seeds(path, seeds_of(entry))
+            else:
+                self._reopen(number, path, entry)
+        if self._entries:
+            self._expect_same(self.paths[0], read_header(self.paths[0]))
+
+    def remove(self) -> None:
+        """Delete all files."""
+        for path in (self.manifest, *self.paths, self._path):
+            path.with_suffix(".json").unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
+        self._listed, self.paths = [], []
+
+    def write(
+        self,
+        file: OpenFile,
+        places: Mapping[int, Path | str],
+        sources: Iterable[Source] = (),
+        *,
+        last: bool,
+    ) -> None:
+        """Write a file; the manifest must be written after it.
+
+        Args:
+            file: What is there.
+            places: Where its episodes are, by seed, ascending: parts, or groups of what is there.
+            sources: What parts say of their source.
+            last: Whether it may grow; else the next file becomes the last.
+
+        Raises:
+            RecordingError: If it cannot be written, or an episode not be read.
+        """
+        path, kept = file_path(self._path, file.number), file.episodes.keys() & places.keys()
+        file.sources = frozenset(sources) | (file.sources if kept else frozenset())
+        about = combined(file.sources or [source_of(self._header)])
+        header = numbered({**self._header, **about}, file.number)
+        if not file.whole or [*places.values()] != [held.group for held in file.episodes.values()]:
+            file.episodes = join(path, header, places)
+            file.whole, file.lost = True, frozenset()
+        abouts = [held.about for held in file.episodes.values()]
+        episodes = [{"episode_id": number, **about} for number, about in enumerate(abouts)]
+        text = json.dumps({**header, "episodes": episodes}, indent=1) + "\n"
+        _write_if_other(path.with_suffix(".json"), text)
+        self.seeds.update(places)
+        entry = FileEntry(
+            file=path.name,
+            h5=sized_file(path),
+            json=sized_file(path.with_suffix(".json")),
+            episodes=len(abouts),
+            successes=sum(bool(about["success"]) for about in abouts),
+            steps=sum(about["elapsed_steps"] for about in abouts),
+            seeds=spans_of(file.episodes),
+        )
+        if last:
+            self._last_entry = entry if file.number else None
+            return
+        self._entries[file.number : file.number + 1] = [entry]
+        if file is self.last:
+            self.last = OpenFile(file.number + 1)
+
+    def write_manifest(self) -> None:
+        """Write which files there are; none if there is one alone.
+
+        Raises:
+            RecordingError: If it cannot be written.
+        """
+        if not self._entries:
+            self.manifest.unlink(missing_ok=True)
+            return
+        entries = [*self._entries, *([self._last_entry] if self._last_entry else [])]
+        task_id = self._header["env_info"]["env_id"]
+        manifest = RecordingManifest(task_id, header_hash(self._header), entries)
+        _write_if_other(self.manifest, manifest_text(manifest))
+
+    def write_empty(self) -> None:
+        """Write the last file without episodes; none if there are others.
+
+        Raises:
+            RecordingError: If it cannot be written.
+        """
+        if not self.last.number:
+            self.write(self.last, {}, last=True)
+        else:
+            path = file_path(self._path, self.last.number)
+            path.with_suffix(".json").unlink(missing_ok=True)
+            path.unlink(missing_ok=True)
+        self.write_manifest()
+
+    def read_groups(self, file: OpenFile, seeds: Iterable[int]) -> Iterator[tuple[int, Stored]]:
+        """Yield episodes of one of the files with their seeds.
+
+        Raises:
+            RecordingError: If one is damaged.
+        """
+        path = file_path(self._path, file.number)
+        with (
+            damage_errors(lambda reason: damaged_recording(path, reason)),
+            Hdf5File(path) as opened,
+        ):
+            for seed in seeds:
+                yield seed, read_joined_episode(opened, file.episodes[seed].group)
+
+    def _read_manifest(self) -> list[FileEntry]:
+        try:
+            manifest = read_manifest(self._path)
+        except TrajectoryError:  # the files are read in its place, and it is written anew
+            return []
+        if manifest is None or manifest.header != header_hash(self._header):
+            return []
+        return manifest.files
+
+    def _find(self) -> list[Path]:
+        for path in (self._path, self._path.with_suffix(".json")):
+            _expect_file_or_nothing(path)
+        count = int(self._path.exists())
+        while (path := file_path(self._path, number := max(count, 1))).exists():
+            _expect_file_or_nothing(path)
+            if number >= len(self._listed) and read_header(path).get(FILE_NUMBER) != number:
+                raise RecordingError(
+                    f"{path} is a recording of its own, in the place of a later file of"
+                    f" {self._path}; choose another name"
+                )
+            count = number + 1
+        return [file_path(self._path, i) for i in range(max(count, len(self._listed)))]
+
+    def _read_all(self, number: int, path: Path, entry: FileEntry | None) -> OpenFile:
+        """Read all of a file."""
+        listed = frozenset(seeds_of(entry) if entry else ())
+        if not path.exists():
+            self.damaged.append(f"{path} with its {len(listed)} episodes, which is gone,")
+            return OpenFile(number, lost=listed)
+        header, episodes, damaged = read_joined(path)
+        self._expect_same(path, header)
+        self.damaged += [f"{name} of {path}" for name in damaged]
+        self._note_seeds(path, episodes)
+        in_order = [held.group for held in episodes.values()] == [
+            f"traj_{i}" for i in range(len(episodes))
+        ]
+        return OpenFile(
+            number,
+            episodes,
+            frozenset([source_of(header)] if episodes else ()),
+            listed - set(episodes),
+            in_order and not damaged,
+        )
+
+    def _reopen(self, number: int, path: Path, entry: FileEntry | None) -> None:
+        """Mend a full file that is not as the manifest says, or leave that until the end."""
+        if entry is None and not path.exists():
+            raise RecordingError(
+                f"{path} is gone, and nothing says what it held; bring it back, or choose another"
+                " folder"
+            )
+        file = self._read_all(number, path, entry)
+        if entry is not None and file.lost:
+            self.mending[number] = file
+            self._entries.append(entry)
+        else:
+            self.write(file, {s: held.group for s, held in file.episodes.items()}, last=False)
+
+    def _note_seeds(self, path: Path, seeds: Iterable[int]) -> None:
+        before, seeds = len(self.seeds), list(seeds)
+        self.seeds.update(seeds)
+        if len(self.seeds) != before + len(seeds):
+            raise RecordingError(f"{path} holds an episode of a seed that a file before it holds")
+
+    def _expect_same(self, path: Path, header: Mapping[str, Any]) -> None:
+        if found := header_differences(header, self._header):
+            raise RecordingError(
+                f"{path} was recorded with something else, so this recording cannot go on there"
+                f" ({listing(found)}); choose another folder"
+            )
 
 
 class _Part(NamedTuple):
@@ -318,3 +580,19 @@ class Recorder:
             self._files.write_empty()
         with suppress(OSError):  # something else was put there meanwhile, and is not ours to delete
             self.parts.rmdir()
+
+
+def _write_if_other(path: Path, text: str) -> None:
+    with suppress(UnreadableFileError):
+        if read_text(path, MAX_JSON) == text:
+            return
+    write_whole(path, text, RecordingError, parents=False)
+
+
+def _expect_file_or_nothing(path: Path) -> None:
+    """Refuse a path at which there is something that is no file, before anything is recorded."""
+    if os.path.lexists(path) and path.exists():
+        try:
+            open_regular(path).close()
+        except UnreadableFileError as error:
+            raise RecordingError(f"cannot write {path}: {error.strerror}") from error

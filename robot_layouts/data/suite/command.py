@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from robot_layouts.core.cli import Word
 from robot_layouts.core.commands import printable
-from robot_layouts.data.playing.command_options import GOES_ON, Players, stoppable
+from robot_layouts.data.playing.command_options import GOES_ON, Players, stoppable, tell
 
 if TYPE_CHECKING:
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.playing.executor import Event
+    from robot_layouts.data.playing.scheduler import Event
     from robot_layouts.data.suite.suite import Case
 
 SuiteName = Annotated[str, Word("SUITE")]
@@ -31,7 +32,7 @@ def show(suite: SuiteName, *, task: Tasks = ()) -> None:
     Raises:
         RobotLayoutsError: If there is no such suite, or it makes no sense.
     """
-    from robot_layouts.data.suite.files import load_suite
+    from robot_layouts.data.suite.suite import load_suite
 
     _import_tasks(task)
     loaded = load_suite(suite)
@@ -64,9 +65,9 @@ def run(
         RobotLayoutsError: If a suite or a policy makes no sense.
     """
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.suite.files import load_suite
+    from robot_layouts.data.suite.report import summary
     from robot_layouts.data.suite.run import chosen_cases, run_suite
-    from robot_layouts.data.suite.tables import summary
+    from robot_layouts.data.suite.suite import load_suite
 
     loaded = load_suite(suite, import_tasks=True)
     episodes = sum(len(case.seeds) for case in chosen_cases(loaded, only))
@@ -77,7 +78,7 @@ def run(
             _policies(policy),
             only=only,
             executor=players.executor(),
-            on_event=_Status(line).show,
+            on_event=_shower(line),
         )
     for sentence in summary(found):
         print(printable(sentence))
@@ -100,7 +101,7 @@ def report(
         RobotLayoutsError: If a run cannot be read, or the page not be written.
     """
     from robot_layouts.core.writing import write_whole
-    from robot_layouts.data.suite.page import read_runs, render_markdown, render_page
+    from robot_layouts.data.suite.report import read_runs, render_markdown, render_page
 
     _import_tasks(task)
     runs = read_runs(folders)
@@ -127,8 +128,7 @@ def verify(folder: RunFolder, *, policy: Policies = (), task: Tasks = (), player
         RobotLayoutsError: If a run or a policy makes no sense.
     """
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.suite.folder import read_run
-    from robot_layouts.data.suite.run import verify_run
+    from robot_layouts.data.suite.run import read_run, verify_run
 
     _import_tasks(task)
     played = read_run(folder)
@@ -138,7 +138,7 @@ def verify(folder: RunFolder, *, policy: Policies = (), task: Tasks = (), player
             played,
             _policies(policy),
             executor=players.executor(),
-            on_event=_Status(line).show,
+            on_event=_shower(line),
         )
     for name, verification in found.items():
         print(printable(f"{name}: {verification}"))
@@ -163,7 +163,7 @@ def _policies(words: Sequence[str]) -> dict[str, str] | None:
     Raises:
         TaskError: If a task is given twice.
     """
-    from robot_layouts.data.suite.files import OTHERS
+    from robot_layouts.data.suite.suite import OTHERS
     from robots import TaskError
 
     if not words:
@@ -177,23 +177,20 @@ def _policies(words: Sequence[str]) -> dict[str, str] | None:
     return found
 
 
-class _Status:
-    """How far it is, over all cases."""
+def _shower(line: Progress) -> Callable[[Case, Event | None], None]:
+    """Return what shows how far all cases are."""
+    before, solved = 0, Counter[bool]()
 
-    def __init__(self, line: Progress) -> None:
-        self._line = line
-        self._played = self._solved = self._before = 0
-
-    def show(self, case: Case, event: Event | None) -> None:
-        """Tell what has come of the episodes so far."""
+    def show(case: Case, event: Event | None) -> None:
+        nonlocal before
         if event is None:
-            self._before += len(case.seeds)
-            self._line.say(f"{case.name} was played before")
+            before += len(case.seeds)
+            line.say(f"{case.name} was played before")
             return
-        if event.news is not None:
-            self._line.say(event.news)
+        tell(line, event)
         if event.result is not None:
-            self._played += 1
-            self._solved += event.result.success
-        words = f"{case.name} (succeeded so far: {self._solved})"
-        self._line.update(self._before + self._played, words)
+            solved[event.result.success] += 1
+        words = f"{case.name} (succeeded so far: {solved[True]})"
+        line.update(before + solved.total(), words)
+
+    return show

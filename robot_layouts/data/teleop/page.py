@@ -12,11 +12,19 @@ import numpy as np
 from layouts.viewer.page import tell
 from layouts.viewer.server import serving
 from layouts.viewer.text import Text, printable
-from robot_layouts.data.teleop.controls import KEYS, KEYS_TEXT, ArmControl, Jog, browser_name
-from robot_layouts.data.teleop.pace import Pace
-from robot_layouts.data.teleop.picture import Picture
 from robot_layouts.data.teleop.session import Phase, Session
-from robot_layouts.data.teleop.stopwatch import QUICK, Stopwatch, gizmo_node
+from robot_layouts.data.teleop.widgets import (
+    KEYS,
+    KEYS_TEXT,
+    QUICK,
+    ArmControl,
+    Jog,
+    Pace,
+    Picture,
+    Stopwatch,
+    browser_name,
+    gizmo_node,
+)
 from robot_layouts.kinematics.rotations import Floats
 from robots import RobotLayoutsError
 from tasks.description import read_docstring

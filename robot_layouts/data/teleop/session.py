@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from robot_layouts.core.bounds import expect_unit
 from robot_layouts.core.catalogue import reason
+from robot_layouts.data.actors import PERSON, Actor, actor_of, check_policy, episode_source
 from robot_layouts.data.recording.recorder import Recorder
-from robot_layouts.data.sources.actors import PERSON, Actor, actor_of, episode_source
-from robot_layouts.data.sources.policies import check_policy
 from robot_layouts.data.teleop.steering import Steering
 from robot_layouts.kinematics.rotations import Floats, multiply, quaternion_about
 from robots import RecordingError, TaskError, UnknownNameError

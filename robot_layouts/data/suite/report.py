@@ -1,15 +1,18 @@
-"""The tables of a suite's report as texts, for the page and for Markdown."""
+"""The report of a suite's runs: tables as texts, on one HTML page and the same as Markdown."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
 
-from robot_layouts.core.pages import plural
+from robot_layouts.core.pages import Tile, fragment, page, plural
+from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.receipts.receipt import Receipt
-from robot_layouts.data.sources.policies import EXPERT
-from robot_layouts.data.suite.folder import SuiteRun
 from robot_layouts.data.suite.results import (
     Comparison,
     Interval,
@@ -18,7 +21,9 @@ from robot_layouts.data.suite.results import (
     overall,
     result_of,
 )
+from robot_layouts.data.suite.run import SuiteRun, expect_untouched, read_run
 from robot_layouts.data.suite.suite import SHORT
+from robots import TaskError
 
 ALL = "all"  # the row of all cases together
 NONE = "–"
@@ -41,10 +46,15 @@ _SHOWN, _REASONS = 10, 3  # seeds and reasons that a row names
 _NAMED = ("robot-layouts", "sapien", "torch", "numpy", "python")  # versions
 
 Rows = Sequence[tuple[str, ...]]
+STYLE = ("robot_layouts.data.suite", "suite.css")
+
+_MARKUP = re.compile(r"[\\`*_\[\]!|~]|(?<=:)/|(?<=www)\.", re.IGNORECASE)
+
+_WIDTH, _ROW = 160, 12  # of a chart of intervals
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """Names of columns, and rows, the first column of which says what a row is of."""
 
     names: tuple[str, ...]
@@ -61,7 +71,7 @@ def results_of(runs: Sequence[SuiteRun]) -> dict[str, list[Result | None]]:
     return {**found, ALL: [overall(list(receipts.values())) for receipts in played]}
 
 
-def successes(runs: Sequence[SuiteRun]) -> Table:
+def successes(runs: Sequence[SuiteRun]) -> ReportTable:
     """Return the success rate of each case, by run."""
     rows: list[tuple[str, ...]] = []
     for name, results in results_of(runs).items():
@@ -71,20 +81,20 @@ def successes(runs: Sequence[SuiteRun]) -> Table:
             for result in results
         ]
         rows.append((name, *rates, " / ".join(sorted(counts)) or NONE))
-    return Table(("case", *_columns(runs, "success"), "episodes"), rows)
+    return ReportTable(("case", *_columns(runs, "success"), "episodes"), rows)
 
 
-def lengths(runs: Sequence[SuiteRun]) -> Table:
+def lengths(runs: Sequence[SuiteRun]) -> ReportTable:
     """Return lengths and returns of each case, by run."""
     results = {name: found for name, found in results_of(runs).items() if name != ALL}
     rows = [
         (name, *(cell for result in found for cell in _length(result)))
         for name, found in results.items()
     ]
-    return Table(("case", *_columns(runs, "steps", "from, to", "return")), rows)
+    return ReportTable(("case", *_columns(runs, "steps", "from, to", "return")), rows)
 
 
-def comparisons(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, Table]]:
+def comparisons(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, ReportTable]]:
     """Yield a title and a table for each run but the first, which it is compared with."""
     other = runs[0]
     for letter, one in list(zip(LETTERS, runs, strict=False))[1:]:
@@ -94,10 +104,10 @@ def comparisons(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, Table]]:
             rows = [(n, *_compared(c)) for n, c in zip([*both, ALL], found, strict=True)]
             names = ("case", f"only {letter}", f"only {LETTERS[0]}", "difference")
             title = f"{letter} beside {LETTERS[0]}, seed by seed"
-            yield title, Table((*names, "95 % interval", "p", "p (Holm)"), rows)
+            yield title, ReportTable((*names, "95 % interval", "p", "p (Holm)"), rows)
 
 
-def failures(runs: Sequence[SuiteRun]) -> Table:
+def failures(runs: Sequence[SuiteRun]) -> ReportTable:
     """Return which seeds failed, and why if that is known."""
     rows = [
         (letter, name, *_failed(receipt))
@@ -105,10 +115,10 @@ def failures(runs: Sequence[SuiteRun]) -> Table:
         for name, receipt in run.receipts.items()
         if receipt.success_rate < 1
     ]
-    return Table(("run", "case", "failed", "seeds", "reasons"), rows)
+    return ReportTable(("run", "case", "failed", "seeds", "reasons"), rows)
 
 
-def players(runs: Sequence[SuiteRun]) -> Table:
+def players(runs: Sequence[SuiteRun]) -> ReportTable:
     """Return who played, where, and on what."""
     rows: list[tuple[str, ...]] = []
     for letter, run in zip(LETTERS, runs, strict=False):
@@ -117,10 +127,10 @@ def players(runs: Sequence[SuiteRun]) -> Table:
             (letter, run.folder.resolve().name, policy, plural(count, "case"), digest, machine)
             for (policy, digest, machine), count in cases.items()
         ]
-    return Table(("run", "folder", "policy", "played", "SHA-256 begins", "on"), rows)
+    return ReportTable(("run", "folder", "policy", "played", "SHA-256 begins", "on"), rows)
 
 
-def receipts(runs: Sequence[SuiteRun]) -> Table:
+def receipts(runs: Sequence[SuiteRun]) -> ReportTable:
     """Return how the hash of each receipt begins."""
     rows = [
         (
@@ -129,7 +139,7 @@ def receipts(runs: Sequence[SuiteRun]) -> Table:
         )
         for case in runs[0].suite.cases
     ]
-    return Table(("case", *_columns(runs, "receipt")), rows)
+    return ReportTable(("case", *_columns(runs, "receipt")), rows)
 
 
 def percent(share: float) -> str:
@@ -196,3 +206,124 @@ def summary(run: SuiteRun) -> Iterator[str]:
     for name, rate, episodes in table.rows:
         words = "not played" if rate == NONE else f"{rate} % of {episodes}"
         yield f"  {name:<{width}}  {words}"
+
+
+def read_runs(folders: Sequence[Path]) -> list[SuiteRun]:
+    """Return runs of one suite, to be shown side by side.
+
+    Raises:
+        TaskError: If they are of several suites, too many, or nothing was played.
+        ReceiptError: If a receipt is damaged, or was changed.
+    """
+    if not 1 <= len(folders) <= len(LETTERS):
+        raise TaskError(f"{len(folders)} runs were given; a report shows 1 to {len(LETTERS)}")
+    runs = [expect_untouched(read_run(folder)) for folder in folders]
+    for run in runs:
+        if run.suite.hash != runs[0].suite.hash:
+            names = " and ".join(f"{r.folder}: {r.suite.name} {r.suite.id}" for r in (runs[0], run))
+            raise TaskError(f"runs of one suite can be compared; these are of two ({names})")
+        if not run.receipts:
+            raise TaskError(f"nothing has been played in {run.folder}; there is nothing to report")
+    return runs
+
+
+def render_page(runs: Sequence[SuiteRun]) -> str:
+    """Return the report as HTML; see `read_runs`."""
+    suite, results = runs[0].suite, results_of(runs)
+    total = zip(runs, results[ALL], strict=True)
+    return page(
+        "robot_layouts.data.suite/report.html.jinja",
+        STYLE,
+        kicker="robot-layouts, a suite",
+        title=f"{suite.name} {suite.id}",
+        note=_about(runs),
+        tiles=[
+            Tile("episodes", f"{suite.episodes:,}", f"{plural(len(suite.cases), 'case')}"),
+            *(_tile(number, *of) for number, of in enumerate(total)),
+        ],
+        parts=[_shown(part, results) for part in _parts(runs)],
+    )
+
+
+def render_markdown(runs: Sequence[SuiteRun]) -> str:
+    """Return the report's tables as Markdown; see `read_runs`."""
+    suite = runs[0].suite
+    lines = [f"# {suite.name} {suite.id}", "", f"{_about(runs)} SHA-256: `{suite.hash}`.", ""]
+    for title, words, shown, text in _parts(runs):
+        lines += [f"## {title}", "", *([words, ""] if words else []), *_markdown(shown, text), ""]
+    return "\n".join(lines)
+
+
+def _parts(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str, ReportTable, int]]:
+    """Yield of each part its title, its words, a table, and how many columns of it are text."""
+    yield "Success", INTERVALS, successes(runs), 1
+    for title, found in comparisons(runs):
+        yield title, PAIRED, found, 1
+    words = "Steps are the median of all episodes and the range; the return is the mean."
+    yield "Lengths and returns", words, lengths(runs), 1
+    if (failed := failures(runs)).rows:
+        yield "Failures", "", failed, 5
+    yield "Who played", "", players(runs), 6
+    words = "How the SHA-256 of each receipt begins; robot-layouts suite verify plays them again."
+    yield "Receipts", words, receipts(runs), 1 + len(runs)
+
+
+def _shown(
+    part: tuple[str, str, ReportTable, int], results: Mapping[str, Sequence[Result | None]]
+) -> dict[str, Any]:
+    """Return a part as the page's template takes it; that of successes has a chart in each row."""
+    title, words, shown, text = part
+    names, rows = shown.names, shown.rows
+    if title == "Success":
+        names = (*names[:-1], "0 to 100 %", names[-1])
+        rows = [(*row[:-1], _chart(results[row[0]]), row[-1]) for row in rows]
+    return {"title": title, "words": words, "names": names, "rows": rows, "text": text}
+
+
+def _tile(number: int, run: SuiteRun, result: Result | None) -> Tile:
+    assert result is not None  # `read_runs` has seen to that
+    note = f"{result.successes:,} of {result.episodes:,}"
+    if run.missing:
+        note += f"; {plural(len(run.missing), 'case')} not played"
+    label = f"{LETTERS[number]}: success of {run.folder.resolve().name}"
+    return Tile(label, f"{percent(result.rate)} %", note)
+
+
+def _about(runs: Sequence[SuiteRun]) -> str:
+    suite = runs[0].suite
+    count = f"{plural(len(suite.cases), 'case')}, {suite.episodes:,} episodes"
+    return f"A suite of {count}, in {plural(len(runs), 'run')}."
+
+
+def _chart(results: Sequence[Result | None]) -> str:
+    """Return an interval for each run, drawn from 0 to 100 %."""
+    whiskers = [
+        {
+            "place": place,
+            "words": f"{LETTERS[place]}: {result.successes:,} of {result.episodes:,}",
+            "y": _ROW * (place + 0.5),
+            "low": _WIDTH * result.interval[0],
+            "high": _WIDTH * result.interval[1],
+            "rate": _WIDTH * result.rate,
+        }
+        for place, result in enumerate(results)
+        if result is not None
+    ]
+    sizes = {"width": _WIDTH, "height": _ROW * len(results)}
+    return fragment("robot_layouts.data.suite/intervals.svg.jinja", whiskers=whiskers, **sizes)
+
+
+def _markdown(shown: ReportTable, text: int) -> Iterator[str]:
+    yield _row(shown.names)
+    yield _row([("---" if place < text else "--:") for place in range(len(shown.names))])
+    yield from map(_row, shown.rows)
+
+
+def _row(cells: Sequence[str]) -> str:
+    """Return a row, in which no cell is markup, nor a link to those who find links in texts."""
+    plain = (escape(" ".join(cell.split()), quote=False) for cell in cells)
+    return f"| {' | '.join(_MARKUP.sub(_entity, cell) for cell in plain)} |"
+
+
+def _entity(found: re.Match[str]) -> str:
+    return f"&#{ord(found[0])};"

@@ -1,4 +1,4 @@
-"""Who acted in an episode, as plain data that its recording keeps."""
+"""Who acts: policies by name, and what a recording keeps of experts, policies and people."""
 
 from __future__ import annotations
 
@@ -6,30 +6,63 @@ import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
-from hashlib import sha256
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.core.files import open_regular
-from robots import RecordingError, UnreadableFileError
+from robot_layouts.core.importing import imported
+from robot_layouts.data.reading.json_files import sized_file
+from robots import RecordingError, TaskError, UnreadableFileError
 
-EXPERT, POLICY, PERSON = "expert", "policy", "person"
+EXPERT = "expert"
+POLICY, PERSON = "policy", "person"
 MIXED, CORRECTION = "mixed", "correction"
 
 TYPE, DESCRIPTION = "source_type", "source_desc"  # ManiSkill's fields of a recording's header
 _BETWEEN = "; "  # sources in the latter
 
-MOST_ACTORS = 255  # of an episode: who acted is kept in one byte for each step
-
-_CHUNK = 2**20  # bytes read at a time
 
 Turns = NDArray[np.uint8]
 Source = tuple[str | None, str | None]
 """What a recording says of its source as a whole: ``source_type`` and ``source_desc``."""
+
+
+def find_policy(name: str, what: str = "policy") -> Any:
+    """Return what ``MODULE:NAME`` names, or the word ``"expert"`` as it is.
+
+    Args:
+        name: The name.
+        what: What is looked for, in a word that an error uses.
+
+    Raises:
+        TaskError: If it cannot be imported.
+    """
+    if name == EXPERT and what == "policy":
+        return name
+    module, _, attribute = name.partition(":")
+    if not module or not attribute:
+        word = f", or the word {EXPERT!r}" if what == "policy" else ""
+        raise TaskError(f"{what} is {name!r}; it must be MODULE:NAME, something callable{word}")
+    return check_policy(imported(name, what, TaskError), what)
+
+
+def check_policy(policy: Any, what: str = "policy") -> Any:
+    """Return what gives actions, or refuse what cannot.
+
+    Raises:
+        TaskError: If it is not callable, or a class.
+    """
+    if isinstance(policy, type):
+        raise TaskError(
+            f"{what} is the class {policy.__qualname__}; give an instance of it, such as"
+            f" {policy.__qualname__}()"
+        )
+    if not callable(policy):
+        word = f", or the word {EXPERT!r}" if what == "policy" else ""
+        raise TaskError(f"{what} is {policy!r}; it must be callable, obs → action{word}")
+    return policy
 
 
 @dataclass(frozen=True)
@@ -54,7 +87,7 @@ class Actor:
 
 
 def actor_of(policy: Any, name: str | None = None) -> Actor:
-    """Return who a policy is, or somebody who takes over.
+    """Return who a policy is, or a person who takes over.
 
     Args:
         policy: What gives actions. It may say by its attribute ``actor`` who it is, an `Actor`, or
@@ -94,16 +127,13 @@ def episode_source(
     """
     numbers, places = np.unique(turns, return_inverse=True)
     acted = [actors[number].to_json() for number in numbers]
+    names = ", ".join(dict.fromkeys(actor["name"] for actor in acted))
     several = {"actors": acted} if len(acted) > 1 else {}
     if corrector is not None:
         about = {**corrector.to_json(), "kind": CORRECTION, "corrects": actors[0].to_json()}
     else:
-        about = {"kind": MIXED, "name": _listing(acted)} if several else acted[0]
+        about = {"kind": MIXED, "name": names} if several else acted[0]
     return {**about, **several}, places.astype(np.uint8) if several else None
-
-
-def _listing(acted: Sequence[dict[str, Any]]) -> str:
-    return ", ".join(dict.fromkeys(actor["name"] for actor in acted))
 
 
 def source_of(header: Mapping[str, Any]) -> Source:
@@ -143,21 +173,8 @@ def _checksum(policy: Any) -> str | None:
         if file is None or not Path(file).is_file():
             return None
     try:
-        return checksum(file)
+        return sized_file(file)["sha256"]
     except (TypeError, ValueError, OSError, UnreadableFileError) as error:
         raise RecordingError(
             f"the file {file!r} of the policy {name_of(policy)} cannot be read: {error}"
         ) from error
-
-
-def checksum(path: str | PathLike[str]) -> str:
-    """Return the SHA-256 of a file, in hex.
-
-    Raises:
-        UnreadableFileError: If it cannot be read.
-    """
-    digest = sha256()
-    with open_regular(path) as stream:
-        while chunk := stream.read(_CHUNK):
-            digest.update(chunk)
-    return digest.hexdigest()

@@ -1,0 +1,298 @@
+"""Commands in which executors play many episodes: to record, judge, certify or verify them."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from robot_layouts.core.cli import Count, Folder, Seed, Word
+from robot_layouts.core.commands import printable
+from robot_layouts.core.pages import plural
+from robot_layouts.data.playing.command_options import (
+    GOES_ON,
+    Acting,
+    Players,
+    Policy,
+    RecordingOption,
+    megabytes,
+    stoppable,
+    tell,
+)
+from robot_layouts.data.playing.seeds import seed_lines
+from robot_layouts.data.reading.json_files import FILE_SIZE
+from robots import RecordingError, RobotDescriptor
+from tasks.cell_options import Cell, PlacedRobot, chosen_robots
+
+if TYPE_CHECKING:
+    from robot_layouts.data.dataset.certificate import RecordingCertificate
+    from robot_layouts.data.playing.scheduler import Event
+    from robot_layouts.data.recording.record import Summary
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordOptions(Acting):
+    """Who acts, and what is written.
+
+    Attributes:
+        takeover: Policy that acts instead at every step for which it returns an action, not None.
+        corrector: Policy whose action is recorded at every step beside the one that is played.
+        num_envs: Episodes that each process plays at once.
+        file_size: Begin another file, trajectory_0001.h5 and so on, when one is so large.
+    """
+
+    takeover: Policy | None = None
+    corrector: Policy | None = None
+    num_envs: Count = 1
+    file_size: Annotated[float, Word("MB", megabytes)] = FILE_SIZE
+
+
+def record(
+    *,
+    task: str,
+    episodes: Count,
+    out: Folder,
+    players: Players,
+    seed: Seed = 0,
+    options: RecordOptions,
+    cell: Cell,
+) -> int:
+    """Let an expert or a policy play episodes in worker processes, and record them.
+
+    The same command goes on where it was stopped or killed. Exit code: 0 if every episode was
+    recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an
+    action; see robot_layouts.record. Episodes of other seeds may come from others: each says who
+    acted.
+
+    Args:
+        task: Task id; MODULE:ID for one of your own.
+        episodes: Number of episodes.
+        out: Folder of trajectory.h5 and .json.
+        players: Who plays.
+        seed: Seeds S … S + N - 1.
+        options: Who acts, and what is written.
+        cell: The task's robots, and what varies.
+
+    Raises:
+        RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
+    """
+    from robot_layouts.core.processes.start import WorkerError
+    from robot_layouts.core.progress import Progress
+    from robot_layouts.data.reading.recording import FILE
+    from robot_layouts.data.recording.record import record as recorded
+
+    executor, line = players.executor(), Progress(episodes, "episodes")
+    kept, solved = "0 episodes are recorded", 0
+
+    def show(summary: Summary, event: Event | None) -> None:
+        nonlocal kept, solved
+        kept = f"{summary.recorded} episodes are recorded"
+        if event is None:
+            for what in summary.damaged:
+                line.say(f"{what} is damaged and does not count as recorded")
+            if summary.already:
+                line.say(f"{summary.already} of {episodes} episodes were recorded before")
+        else:
+            tell(line, event, "is not recorded")
+            solved += event.result is not None and event.result[0].success
+        who = f"; {len(summary.workers)} workers" if len(summary.workers) > 1 else ""
+        done = summary.already + len(summary.played)
+        line.update(done, f"recording (succeeded so far: {solved}{who})")
+
+    try:
+        with stoppable(lambda: f"stopped; {kept}; the same command goes on from there"), line:
+            summary = recorded(
+                task,
+                range(seed, seed + episodes),
+                out,
+                executor,
+                on_event=show,
+                **vars(options),
+                **cell.making(),
+            )
+    except (RecordingError, WorkerError):
+        print(f"stopped; {kept}", file=sys.stderr)
+        raise
+    _report(summary, out / FILE)
+    return 1 if summary.failed else 0
+
+
+def _report(summary: Summary, path: Path) -> None:
+    played = summary.played.values()
+    print(f"{path}: {plural(summary.recorded, 'episode')}")
+    if played:
+        solved = sum(score.success for score in played)
+        steps = sum(score.steps for score in played) / len(played)
+        new = plural(len(played), "new episode")
+        print(f"{new}, {solved} with success, {steps:.1f} steps on average")
+        if len(summary.workers) > 1:
+            print(f"played by {len(summary.workers)} workers")
+    failed = {seed: score.reason for seed, score in summary.played.items() if not score.success}
+    for line in seed_lines("no success", dict(sorted(failed.items()))):
+        print(line)
+    for death in summary.deaths:
+        print(f"replaced: {death}")
+    reasons = {seed: str(error) for seed, error in sorted(summary.failed.items())}
+    for line in seed_lines("not recorded", reasons):
+        print(line)
+
+
+def evaluate(
+    *,
+    task: str,
+    episodes: Count = 100,
+    players: Players,
+    seed: Seed = 0,
+    receipt: Annotated[Path, Word("JSON")] | None = None,
+    acting: Acting,
+    cell: Cell,
+) -> None:
+    """Let a policy or an expert play episodes, and print how well it does.
+
+    A policy maps an observation to an action; see robot_layouts.evaluate. Exit code: 0 if all was
+    played, 1 if not, 2 for bad usage, 130 if interrupted.
+
+    Args:
+        task: Task id; MODULE:ID for one of your own.
+        episodes: Number of episodes.
+        players: Who plays.
+        seed: Seeds S … S + N - 1.
+        receipt: Write a receipt, which `verify` plays again.
+        acting: Who acts, and how.
+        cell: The task's robots, and what varies.
+
+    Raises:
+        RobotLayoutsError: If it makes no sense, or the policy fails.
+    """
+    from robot_layouts.core.progress import Progress
+    from robot_layouts.data import evaluation
+
+    executor, line, solved = players.executor(), Progress(episodes, "episodes"), Counter[bool]()
+
+    def show(event: Event) -> None:
+        tell(line, event)
+        if event.result is not None:
+            solved[event.result.success] += 1
+        line.update(solved.total(), f"evaluating (succeeded so far: {solved[True]})")
+
+    with stoppable(), line:
+        found = evaluation.evaluate(
+            task=task,
+            seeds=range(seed, seed + episodes),
+            executor=executor,
+            receipt=receipt,
+            on_event=show,
+            **vars(acting),
+            **cell.making(),
+        )
+    print(found)
+    if found.receipt is not None:
+        print(f"{receipt}: receipt {found.receipt.hash}")
+
+
+def certify(
+    recording: RecordingOption,
+    *,
+    players: Players,
+    out: Annotated[Path, Word("JSON")] | None = None,
+) -> int:
+    """Play every episode of a recording again, and certify that every bit is the same.
+
+    Compares states, rewards and flags of every step, and counts contacts between arms in every step
+    of physics. The same command goes on where it was stopped. With --ray, every machine must find
+    the recording at the same place. Exit code: 0 if everything is equal, 1 if not, 2 for bad usage,
+    130 if interrupted.
+
+    Args:
+        recording: The recording.
+        players: Who plays.
+        out: The certificate (certificate.json beside it).
+
+    Raises:
+        RobotLayoutsError: If it cannot be certified.
+    """
+    from robot_layouts.core.progress import Progress
+    from robot_layouts.data.dataset.certificate import certificate_path, sentences
+    from robot_layouts.data.dataset.certificate import certify as certified
+
+    path, executor, line = recording.path, players.executor(), Progress(unit="episodes")
+
+    def show(certificate: RecordingCertificate, event: Event | None) -> None:
+        line.total = certificate.episodes
+        if event is not None:
+            tell(line, event, "cannot be played")
+        elif certificate.checked:
+            line.say(f"{len(certificate.checked)} episodes were played before")
+        line.update(len(certificate.checked), f"certifying, {certificate.equal} equal")
+
+    with stoppable(lambda: GOES_ON), line:
+        certificate = certified(
+            path,
+            executor,
+            out,
+            task_id=recording.task,
+            cell=recording.cell.making(),
+            on_event=show,
+        )
+    print(printable(f"{out or certificate_path(path)}: {certificate.task_id}"))
+    for sentence in sentences(certificate):
+        print(printable(sentence))
+    return 0 if certificate.holds else 1
+
+
+def verify(
+    receipt: Annotated[Path, Word("RECEIPT")],
+    *,
+    policy: Policy | None = None,
+    task: Annotated[str, Word("MODULE:ID")] | None = None,
+    robots: Sequence[PlacedRobot] = (),
+    num_envs: Count = 1,
+    players: Players,
+) -> int:
+    """Play the episodes of a receipt again, and compare every bit.
+
+    Tells the first seed and step whose states differ, and which robot files, sources, versions and
+    parts of the processor are not those of the receipt. Exit code: 0 if every bit and file is the
+    same, whatever the versions; 1 if not; 2 for bad usage, 130 if interrupted.
+
+    Args:
+        receipt: What `evaluate --receipt` wrote.
+        policy: The policy, unless it is an expert.
+        task: The task, if no installed package lists it.
+        robots: Which robots these were, where the receipt cannot say it.
+        num_envs: Episodes that play at once.
+        players: Who plays.
+
+    Raises:
+        RobotLayoutsError: If it cannot be played again.
+    """
+    from robot_layouts.core.progress import Progress
+    from robot_layouts.data.receipts import verification
+    from robot_layouts.data.receipts.receipt import Receipt
+
+    read = Receipt.read(receipt)
+    known = chosen_robots(robots) if robots else {}
+    if isinstance(known, RobotDescriptor):
+        known = dict.fromkeys(read.making["layout"], known)
+    executor, line = players.executor(), Progress(len(read.episodes), "episodes")
+    states = {episode.seed: episode.states for episode in read.episodes}
+    equal = Counter[bool]()
+
+    def show(event: Event) -> None:
+        tell(line, event)
+        if event.seed is not None and event.result is not None:
+            equal[event.result.trace.states == states[event.seed]] += 1
+        played = equal.total()
+        line.update(played, f"verifying, {equal[True]} of {played} equal")
+
+    with stoppable(), line:
+        found = verification.verify(
+            read, executor, show, policy=policy, task=task, robots=known, num_envs=num_envs
+        )
+    print(printable(repr(found)))
+    verdict = "equal: this is" if found.equal else "not equal: this is not"
+    print(f"{verdict} what the receipt says")
+    return 0 if found.equal else 1

@@ -1,1 +1,0 @@
-"""Where recorded actions come from: experts, policies, people, and several of them in turn."""
