@@ -134,8 +134,9 @@ def table_outlines(frames: Mapping[str, Pose]) -> dict[str, list[Vector3]]:
     for name, middle in frames.items():
         if all(f"{name}.{edge}" in frames for edge in EDGES):
             north, east, south, west = (frames[f"{name}.{edge}"].position for edge in EDGES)
+            centre = middle.position
             corners[name] = [
-                _sum(a, b, middle.position)
+                (a[0] + b[0] - centre[0], a[1] + b[1] - centre[1], a[2] + b[2] - centre[2])
                 for a, b in ((north, east), (east, south), (south, west), (west, north))
             ]
     return corners
@@ -291,9 +292,3 @@ def _support(name: str, poses: Mapping[str, tuple[str | None, Pose]]) -> str | N
         )
         raise HangingError(f"{name!r} hangs on an {problem}", name)
     return on
-
-
-def _sum(first: Vector3, second: Vector3, start: Vector3) -> Vector3:
-    """Return the point at ``first`` and ``second`` from ``start``, all given in the world."""
-    x, y, z = (a + b - c for a, b, c in zip(first, second, start, strict=True))
-    return (x, y, z)

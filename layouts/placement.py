@@ -205,17 +205,31 @@ def load_robot(robot: RobotLike) -> RobotDescriptor:
     return named_robot(robot)
 
 
-def check_robots(robots: object) -> None:
-    """Refuse what is no mapping from places to robots.
+def load_robots(
+    robots: Mapping[str, RobotLike], what: str = "a layout", count: int | None = None
+) -> dict[str, RobotDescriptor]:
+    """Return the descriptors of robots by their places; see `load_robot`.
+
+    Args:
+        robots: Robot by place.
+        what: What places them, for messages.
+        count: How many it places; None is one or more.
 
     Raises:
-        LayoutError: If it is none.
+        LayoutError: If this is no mapping from places to robots, or not of that many.
     """
     if not isinstance(robots, Mapping):
         raise LayoutError(
             f"robots is {shown(robots)}; it takes a mapping from each robot's place to its robot:"
             " {'left': 'panda', 'right': 'panda'}"
         )
+    if count is not None and len(robots) != count:
+        raise LayoutError(
+            f"{what} places {count} robot{'s' * (count > 1)}; {len(robots)} given: {list(robots)}"
+        )
+    if not robots:
+        raise LayoutError(f"{what} needs at least one robot")
+    return {name: load_robot(robot) for name, robot in robots.items()}
 
 
 def placed(placement: Placement, world: Pose) -> Placement:

@@ -23,7 +23,7 @@ from layouts.distances import apart, centred, gaps, ring_of, share_at_table, tab
 from layouts.frames import EDGES, check_positive
 from layouts.frames import table as table_frames
 from layouts.layout import Layout
-from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
+from layouts.placement import Placement, RobotLike, faced, load_robots
 from robot_layouts.core.bounds import checked_whole, shown
 from robot_layouts.core.catalogue import Catalogue
 from robot_layouts.kinematics.quaternions import yaw_quaternion
@@ -63,8 +63,7 @@ def single(robots: Mapping[str, RobotLike], *, keyframe: str | None = None) -> L
         robots: Its name and robot.
         keyframe: Keyframe it starts from, if not its home's.
     """
-    _expect_count("single", robots, 1)
-    loaded = _loaded(robots)
+    loaded = load_robots(robots, "single", 1)
     return Layout({name: Placement(robot, keyframe=keyframe) for name, robot in loaded.items()})
 
 
@@ -78,7 +77,7 @@ def side_by_side(
         spacing: Distance between neighbouring bases (m); ``"auto"`` chooses it for each pair.
         keyframe: Keyframe every robot starts from; None is each one's home.
     """
-    loaded = _loaded(robots)
+    loaded = load_robots(robots)
 
     def placed(along: Sequence[float]) -> Layout:
         return Layout(
@@ -105,8 +104,7 @@ def face_to_face(
         spacing: Distance between the two bases (m), or ``"auto"``.
         keyframe: Keyframe both robots start from; None is each one's home.
     """
-    _expect_count("face_to_face", robots, 2)
-    loaded = _loaded(robots)
+    loaded = load_robots(robots, "face_to_face", 2)
 
     def placed(distance: float) -> Layout:
         return Layout(
@@ -145,7 +143,7 @@ def ring(
     """
     if not isinstance(facing, str) or facing not in FACING:
         raise UnknownNameError("way to face", facing, FACING)
-    loaded = _loaded(robots)
+    loaded = load_robots(robots)
 
     def placed(radius: float, angles: Sequence[float]) -> Layout:
         placements: dict[str, Placement] = {}
@@ -190,7 +188,7 @@ def around_table(
         LayoutError: If a robot has no edge, or a size or the inset is no distance or does not fit.
         UnknownNameError: If an edge, a robot or a keyframe does not exist.
     """
-    loaded = _loaded(robots)
+    loaded = load_robots(robots)
     sides = _edges(tuple(loaded), edges)
     rows = {edge: [n for n in loaded if sides[n] == edge] for edge in EDGES}
     standing = {edge: [loaded[name] for name in row] for edge, row in rows.items()}
@@ -242,7 +240,7 @@ def grid(
     Raises:
         LayoutError: If ``columns`` is no count.
     """
-    loaded = _loaded(robots)
+    loaded = load_robots(robots)
     count = len(loaded)
     if columns is None:
         columns = math.ceil(math.sqrt(count))
@@ -306,13 +304,6 @@ PRESETS = Catalogue(
     check=_check,
     error=LayoutError,
 )
-
-
-def _loaded(robots: Mapping[str, RobotLike]) -> dict[str, RobotDescriptor]:
-    check_robots(robots)
-    if not robots:
-        raise LayoutError("a layout needs at least one robot")
-    return {name: load_robot(robot) for name, robot in robots.items()}
 
 
 def _placed(
@@ -415,11 +406,3 @@ def _given_table(table: object, inset: float) -> tuple[float, float]:
 def _rounded(value: float) -> float:
     """Round to a picometre, so that a sine of pi is 0; there is no minus zero."""
     return round(value, 12) + 0.0
-
-
-def _expect_count(preset: str, robots: Mapping[str, RobotLike], count: int) -> None:
-    check_robots(robots)
-    if len(robots) != count:
-        raise LayoutError(
-            f"{preset} places {count} robot{'s' * (count > 1)}; {len(robots)} given: {list(robots)}"
-        )

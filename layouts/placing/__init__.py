@@ -7,13 +7,13 @@ from importlib import import_module
 
 from layouts.frames import Frame
 from layouts.layout import Layout
-from layouts.placement import Placement, RobotLike, check_robots, load_robot
+from layouts.placement import Placement, RobotLike, load_robots
 from robot_layouts.core.bounds import checked_number, checked_whole
 from robot_layouts.core.errors import MissingPackageError
 from robot_layouts.core.progress import Progress
 from robots import LayoutError
 
-__all__ = ["Around", "ReachedBy", "search"]
+__all__ = ["ReachedBy", "search"]
 
 Around = Mapping[str, Frame] | Frame | Sequence[float]
 ReachedBy = str | Mapping[str, str | Sequence[str]]
@@ -37,7 +37,7 @@ def search(
     """Look for places from which robots reach targets, clear of each other, and share most space.
 
     A target counts as reached as in `Layout.validate`: without touching anything, the others at
-    their keyframes. Of all places that meet the demands, those are best that share most workspace
+    their keyframes. Of all places that meet this, those are best that share most workspace
     and leave most clearance, at the keyframes and where targets are reached, up to a third of the
     smaller reach. The layout that is returned has passed `Layout.validate`. The same arguments
     give the same layout. Needs the robots' files; takes seconds to a minute, and tells on stderr
@@ -64,7 +64,7 @@ def search(
         partial: Whether to return the best places where not all targets can be reached, instead
             of raising.
         seed: Of what is random in the search.
-        tries: How many of the best places on a grid to better by small steps; more take longer
+        tries: How many of the best places on a grid to refine by small steps; more take longer
             and find better ones.
         patience: After how long to give up (s). It never changes the layout that is returned.
 
@@ -88,10 +88,7 @@ def search(
     from layouts.placing.scene import SearchScene
     from layouts.validation.check import named_targets
 
-    check_robots(robots)
-    if not robots:
-        raise LayoutError("a search needs at least one robot")
-    loaded = {name: load_robot(robot) for name, robot in robots.items()}
+    loaded = load_robots(robots, "a search")
     seed = checked_whole("seed", seed, 0, None, LayoutError)
     tries = checked_whole("tries", tries, 1, None, LayoutError)
     clearance = checked_number("clearance", clearance, 0.0, 10.0, LayoutError, "m")

@@ -29,7 +29,7 @@ class ViewerError(RobotLayoutsError, OSError):
     """A page that cannot be served or saved as asked."""
 
 
-class Site(NamedTuple):
+class PageServer(NamedTuple):
     """A web server that runs.
 
     Attributes:
@@ -42,7 +42,7 @@ class Site(NamedTuple):
 
 
 @contextmanager
-def serving(host: str, port: int, title: str) -> Generator[Site, None, None]:
+def serving(host: str, port: int, title: str) -> Generator[PageServer, None, None]:
     """Start a viser server that lets in only whoever has its token, and stop it at the end.
 
     Args:
@@ -66,7 +66,7 @@ def serving(host: str, port: int, title: str) -> Generator[Site, None, None]:
         if server.get_port() != port:  # viser goes on to the next one without a word
             raise ViewerError(_in_use(host, port))
         _check_guarded(server, host, port)
-        yield Site(server, guard.address(host))
+        yield PageServer(server, guard.address(host))
     finally:
         with redirect_stdout(io.StringIO()):
             server.stop()
