@@ -7,7 +7,6 @@ from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
 from typing import Any, Protocol
 
-from robot_layouts.core.processes.start import preload
 from robot_layouts.core.processes.transport import packed
 from robot_layouts.core.processes.worker import Pool, Reply, Worker, report
 from robot_layouts.data.playing.scheduler import (
@@ -38,8 +37,6 @@ __all__ = [
     "play_all",
     "report",
 ]
-
-preload("tasks.engine.env", "robot_layouts.simulation")
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
 
