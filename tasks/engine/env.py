@@ -12,6 +12,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from torch import Tensor
 
+from robot_layouts.core.processes.start import preload
 from robot_layouts.simulation import Simulation, State, World
 from robot_layouts.simulation.maths import Floats, all_finite
 from robots import SimulationError, TaskError
@@ -45,6 +46,8 @@ from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.randomization.distractors import add_distractors, area_of
 from tasks.randomization.randomizer import Randomizer
+
+preload(__name__)  # for workers, which step environments
 
 
 class _FreshScenario:

@@ -30,7 +30,7 @@ from tasks.interfaces.batch import (
     new_shared_memory,
 )
 
-preload(__name__, "robot_layouts.simulation")
+preload(__name__)
 
 START_SECONDS = 300.0  # until all workers have built their worlds
 

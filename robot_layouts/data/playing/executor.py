@@ -8,7 +8,7 @@ from contextlib import closing
 from typing import Any, Protocol
 
 from robot_layouts.core.bounds import checked_whole
-from robot_layouts.core.processes.start import WorkerError, preload
+from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import packed
 from robot_layouts.core.processes.worker import Pool, Reply, Worker
 from robot_layouts.data.playing.scheduler import (
@@ -21,8 +21,6 @@ from robot_layouts.data.playing.scheduler import (
     Scheduler,
 )
 from robots import TaskError
-
-preload("tasks.engine.env", "robot_layouts.simulation")
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
 
