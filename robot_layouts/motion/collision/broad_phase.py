@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.kinematics.rotations import Floats, transform
-from robot_layouts.motion.collision.spheres import BALLS, Cluster, clusters_of
+from robot_layouts.motion.collision.spheres import BALLS, SphereCluster, clusters_of
 from robot_layouts.motion.model.bodies import WORLD, Bodies, Solid
 from robot_layouts.motion.model.link_poses import LinkPoses
 from robots.bodies.hulls import Hull
@@ -37,7 +37,7 @@ _NONE = np.zeros(0, np.intp)
 NOTHING: _Found = (_NONE, _NONE, _NONE, np.zeros(0))
 
 
-class Candidates(NamedTuple):
+class CandidatePairs(NamedTuple):
     """Pairs of solids that may be near each other, each in one state.
 
     Attributes:
@@ -50,9 +50,9 @@ class Candidates(NamedTuple):
     pairs: Indices
     bounds: Floats
 
-    def only(self, which: NDArray[Any]) -> Candidates:
+    def only(self, which: NDArray[Any]) -> CandidatePairs:
         """Return some of them."""
-        return Candidates(self.states[which], self.pairs[which], self.bounds[which])
+        return CandidatePairs(self.states[which], self.pairs[which], self.bounds[which])
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ class BroadPhase:
 
     def candidates(
         self, places: Floats, within: Floats | None = None, more: Floats | None = None
-    ) -> Candidates:
+    ) -> CandidatePairs:
         """Return the pairs that may be too near, by state, the nearest first.
 
         Args:
@@ -141,7 +141,7 @@ class BroadPhase:
         columns = [np.concatenate(column) for column in zip(*found, strict=True)]
         return self._in_order(*columns)
 
-    def nearest(self, places: Floats) -> Candidates:
+    def nearest(self, places: Floats) -> CandidatePairs:
         """Return for each state a pair of solids that are near each other, if any are balls.
 
         Args:
@@ -301,10 +301,10 @@ class BroadPhase:
         solids = clusters.solids[cluster[entry], ball]
         return states[entry], solids, flats.solids[flat[entry]], bounds[entry, ball]
 
-    def _in_order(self, states: Indices, a: Indices, b: Indices, bounds: Floats) -> Candidates:
+    def _in_order(self, states: Indices, a: Indices, b: Indices, bounds: Floats) -> CandidatePairs:
         """Return each pair once in each state, with its least bound, the least first."""
         if not len(states):
-            return Candidates(states, np.zeros((0, 2), np.intp), bounds)
+            return CandidatePairs(states, np.zeros((0, 2), np.intp), bounds)
         counts = np.flatnonzero(self._apart[a, b] > -np.inf)
         states, bounds = states[counts], bounds[counts]
         a, b = np.minimum(a[counts], b[counts]), np.maximum(a[counts], b[counts])
@@ -316,7 +316,7 @@ class BroadPhase:
         np.not_equal(keys[1:], keys[:-1], out=firsts[1:])
         order = order[firsts]
         order = order[np.lexsort((bounds[order], states[order]))]
-        return Candidates(states[order], np.stack([a[order], b[order]], axis=-1), bounds[order])
+        return CandidatePairs(states[order], np.stack([a[order], b[order]], axis=-1), bounds[order])
 
 
 def seen_from(frames: Floats, poses: Floats) -> Floats:
@@ -405,7 +405,7 @@ def _placed(hulls: tuple[Hull, ...], offset: bytes) -> _Placed:
     return _Placed(around, radii, balls, features[..., 3].copy(), features, own)
 
 
-def _moved(cluster: Cluster, pose: Floats) -> Cluster:
+def _moved(cluster: SphereCluster, pose: Floats) -> SphereCluster:
     """Return a cluster somewhere else, at a pose, (4, 4) (m)."""
     turn, at = pose[:3, :3], pose[:3, 3]
     return replace(

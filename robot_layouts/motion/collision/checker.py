@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from layouts.validation.collisions import FAR
 from layouts.validation.findings import length_text
 from robot_layouts.kinematics.rotations import Floats
-from robot_layouts.motion.collision.broad_phase import BroadPhase, Candidates, Indices
+from robot_layouts.motion.collision.broad_phase import BroadPhase, CandidatePairs, Indices
 from robot_layouts.motion.collision.narrow_phase import NarrowPhase
 from robot_layouts.motion.collision.travel import TravelBounds
 from robot_layouts.motion.model.bodies import Bodies
@@ -308,7 +308,7 @@ class Checker:
 
     def within(
         self, qpos: ArrayLike, times: ArrayLike | None, reach: Floats
-    ) -> Iterator[tuple[Candidates, Floats]]:
+    ) -> Iterator[tuple[CandidatePairs, Floats]]:
         """Yield, for some states at a time, pairs of solids and how far they are apart (m).
 
         Those are all pairs that could touch if each part moved from where it is by its reach, and
@@ -332,7 +332,7 @@ class Checker:
             gaps = self._narrow_phase.distances(places, found)
             yield found._replace(states=found.states + first), gaps
 
-    def candidates(self, qpos: ArrayLike, times: ArrayLike | None = None) -> Candidates:
+    def candidates(self, qpos: ArrayLike, times: ArrayLike | None = None) -> CandidatePairs:
         """Return the pairs of solids that bounds alone do not show to be far enough apart.
 
         Args:

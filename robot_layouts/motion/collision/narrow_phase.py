@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.kinematics.rotations import Floats, transform
-from robot_layouts.motion.collision.broad_phase import Candidates, Indices, seen_from
+from robot_layouts.motion.collision.broad_phase import CandidatePairs, Indices, seen_from
 from robot_layouts.motion.model.bodies import Bodies
 from robot_layouts.motion.model.link_poses import LinkPoses
 from robots.bodies.depth import overlap
@@ -49,7 +49,9 @@ class NarrowPhase:
         """Return how far pairs of solids have to be apart, (k,) (m)."""
         return np.array([self._apart[a, b] for a, b in pairs.tolist()], float)
 
-    def too_near(self, places: Floats, candidates: Candidates, *, every: bool) -> NDArray[np.bool_]:
+    def too_near(
+        self, places: Floats, candidates: CandidatePairs, *, every: bool
+    ) -> NDArray[np.bool_]:
         """Tell which candidates are too near to each other, (k,).
 
         Args:
@@ -79,7 +81,7 @@ class NarrowPhase:
         return np.array(near, bool)
 
     def gaps(
-        self, places: Floats, candidates: Candidates, wanted: NDArray[np.bool_]
+        self, places: Floats, candidates: CandidatePairs, wanted: NDArray[np.bool_]
     ) -> Floats | None:
         """Return how far some candidates are apart, (k,) (m); 0 for those that are not asked for.
 
@@ -108,7 +110,7 @@ class NarrowPhase:
                 return None
         return gaps
 
-    def distances(self, places: Floats, candidates: Candidates) -> Floats:
+    def distances(self, places: Floats, candidates: CandidatePairs) -> Floats:
         """Return how far candidates are apart, (k,) (m); -1 for those that overlap.
 
         Args:
@@ -132,7 +134,7 @@ class NarrowPhase:
     def update(
         self,
         places: Floats,
-        candidates: Candidates,
+        candidates: CandidatePairs,
         best: Floats,
         pairs: list[tuple[int, int] | None],
     ) -> None:
@@ -187,7 +189,7 @@ class NarrowPhase:
         depth, points = overlap(*corners)
         return -depth, points
 
-    def _beside(self, places: Floats, candidates: Candidates) -> tuple[Floats, Floats]:
+    def _beside(self, places: Floats, candidates: CandidatePairs) -> tuple[Floats, Floats]:
         """Return where the second of each pair is, seen from the first: (k, 3, 3) and (k, 3)."""
         (a, b), states = candidates.pairs.T, candidates.states
         one = places[self.rows[a], states] @ self._offsets[a]

@@ -26,7 +26,7 @@ STEPS = 100  # of the search for the smallest ball, which ends within 2 % or so
 
 
 @dataclass(frozen=True, eq=False)
-class Cluster:
+class SphereCluster:
     """Some balls, and the one that contains the same part of a body as they do together.
 
     Attributes:
@@ -45,7 +45,7 @@ class Cluster:
 
 
 @lru_cache(maxsize=4096)
-def clusters_of(hulls: tuple[Hull, ...]) -> tuple[Cluster, ...]:
+def clusters_of(hulls: tuple[Hull, ...]) -> tuple[SphereCluster, ...]:
     """Return balls that contain the hulls of one link, in its frame.
 
     Args:
@@ -107,13 +107,13 @@ class _Group:
         half = len(pieces) // 2
         return [_Group(pieces[:half]), _Group(pieces[half:])]
 
-    def cluster(self) -> Cluster:
+    def cluster(self) -> SphereCluster:
         """Return the balls of the pieces, cut until there are enough."""
         pieces = list(self.pieces)
         while len(pieces) < BALLS:
             worst = max(range(len(pieces)), key=lambda i: pieces[i].radius)
             pieces[worst : worst + 1] = pieces[worst].halves
-        return Cluster(
+        return SphereCluster(
             self.middle,
             self.radius,
             np.array([piece.middle for piece in pieces]),

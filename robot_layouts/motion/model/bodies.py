@@ -30,7 +30,7 @@ MOST_SHAPES = 2000  # convex parts of obstacles; a check of more takes minutes a
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RigidBody:
     """What moves as one: a rigid body of a robot, with what it holds, or an obstacle.
 
     Attributes:
@@ -186,8 +186,8 @@ class Bodies:
     def _bases(self) -> dict[str, Floats]:
         return {n: _base(placement) for n, placement in self.layout.items()}
 
-    def _gather_parts(self) -> tuple[Part, ...]:
-        parts = [Part()]
+    def _gather_parts(self) -> tuple[RigidBody, ...]:
+        parts = [RigidBody()]
         for name, model in self.models.items():
             tree = model.kinematics
             self._part_of[name, 0] = WORLD
@@ -195,9 +195,9 @@ class Bodies:
                 if body:
                     parent, pose = self._carried(name, int(tree.parents[body]))
                     self._part_of[name, body] = len(parts)
-                    parts.append(Part(name, body, parent, pose @ tree.origins[body]))
+                    parts.append(RigidBody(name, body, parent, pose @ tree.origins[body]))
         tracks = [o.pose for o in self.obstacles if isinstance(o.pose, Track)]
-        return (*parts, *(Part(track=track) for track in tracks))
+        return (*parts, *(RigidBody(track=track) for track in tracks))
 
     def _gather_solids(self) -> Iterator[Solid]:
         for name, model in self.models.items():

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats
-from robot_layouts.motion.model.bodies import WORLD, Bodies, Part
+from robot_layouts.motion.model.bodies import WORLD, Bodies, RigidBody
 
 
 class LinkPoses:
@@ -95,7 +95,7 @@ class LinkPoses:
             np.matmul(poses[self._parents[own] - 1], motions[own], out=poses[own])
 
 
-def _depths(parts: tuple[Part, ...], wanted: Iterable[int]) -> dict[int, int]:
+def _depths(parts: tuple[RigidBody, ...], wanted: Iterable[int]) -> dict[int, int]:
     """Return how many joints away from the world some parts are, and those that carry them."""
     depths: dict[int, int] = {}
 

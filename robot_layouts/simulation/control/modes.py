@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from layouts import Layout
 from robot_layouts.simulation.backend import Backend
 from robot_layouts.simulation.control.joint_positions import JointPositionController
-from robot_layouts.simulation.control.tcp import Tool, ToolControl
+from robot_layouts.simulation.control.tcp import TcpController, TcpGroup
 from robot_layouts.simulation.maths import Floats, cos, sin
 from robot_layouts.simulation.readout import ReadoutIndex
 from robot_layouts.simulation.state import State
@@ -75,7 +75,9 @@ class ModeController:
         self._scale = _scale(driven)
         owners = layout.arms_by_group
         self._tools = {
-            (part.robot, part.name): ToolControl(_tool(part, layout, owners[part.robot, part.name]))
+            (part.robot, part.name): TcpController(
+                _tcp_group(part, layout, owners[part.robot, part.name])
+            )
             for part in driven
             if part.group.asks.tcp
         }
@@ -220,7 +222,7 @@ def _velocities(driven: Sequence[_Driven]) -> tuple[NDArray[np.intp], NDArray[np
     return np.array(joints, np.intp), np.array(numbers, np.intp)
 
 
-def _tool(part: _Driven, layout: Layout, arm: str) -> Tool:
+def _tcp_group(part: _Driven, layout: Layout, arm: str) -> TcpGroup:
     body, limb = layout[part.robot].robot, layout.arm(arm).robot
     joints = slice(part.joints.start, part.joints.stop)
-    return Tool(part.robot, arm, part.group, body, limb, part.numbers, joints, part.own)
+    return TcpGroup(part.robot, arm, part.group, body, limb, part.numbers, joints, part.own)

@@ -103,7 +103,7 @@ def clipped_turn(angles: Floats) -> Floats:
     return angles * (_ONE / length) if length > _ONE else angles
 
 
-class Tool(NamedTuple):
+class TcpGroup(NamedTuple):
     """A joint group whose action numbers ask for a TCP.
 
     Attributes:
@@ -127,7 +127,7 @@ class Tool(NamedTuple):
     own: slice
 
 
-class ToolControl:
+class TcpController:
     """Drives a joint group by the pose of its TCP, in every world.
 
     Attributes:
@@ -137,7 +137,7 @@ class ToolControl:
             approximates: place (m) and orientation (rad), (N, 2).
     """
 
-    def __init__(self, tool: Tool) -> None:
+    def __init__(self, tool: TcpGroup) -> None:
         """Take what is driven."""
         self.tool, group = tool, tool.group
         start = tool.numbers.start

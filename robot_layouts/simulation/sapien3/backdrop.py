@@ -27,7 +27,7 @@ _SLACK = 1e-3  # m, likewise
 Planes = NDArray[np.float64]
 
 
-class Bodies:
+class DrawnBodies:
     """What is drawn of one world but for its markers: bodies that stand still, and the others.
 
     Attributes:
@@ -91,7 +91,7 @@ class Backdrop:
 
         Args:
             camera: SAPIEN's camera.
-            poses: What `Bodies.still_poses` returned then.
+            poses: What `DrawnBodies.still_poses` returned then.
         """
         self.planes = planes(camera)
         self._poses, self._camera = poses, _place_of(camera)

@@ -29,7 +29,7 @@ from robot_layouts.simulation.sapien3.contacts import (
     overlaps_in,
     presses_on_object,
 )
-from robot_layouts.simulation.sapien3.pose_follower import PoseFollower
+from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
 from robot_layouts.simulation.sapien3.varied import vary
 from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
@@ -185,10 +185,10 @@ class SapienBackend:
 
     def pose_follower(
         self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
-    ) -> PoseFollower:
+    ) -> PinocchioFollower:
         """Return what follows poses of a link; see `Backend`."""
         urdf = self._blueprints[robot].text
-        return PoseFollower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
+        return PinocchioFollower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
 
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch; see `Backend`."""

@@ -24,7 +24,7 @@ _MAX_ITERATIONS = 100  # mani_skill 3.0.1, agents/controllers/utils/kinematics.p
 _GRAVITY = [0, 0, -9.81]  # as there; it moves nothing here
 
 
-class PoseFollower:
+class PinocchioFollower:
     """Follows poses of one link of a robot; see `robot_layouts.simulation.backend.PoseFollower`."""
 
     def __init__(

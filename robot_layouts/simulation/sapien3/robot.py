@@ -16,7 +16,7 @@ from robots import DescriptorError, JointGroup, RobotDescriptor, UnknownNameErro
 from robots.urdf.model import UrdfModel
 
 
-class Linkage:
+class DrivenLinkage:
     """The drives of a joint group with leaders; see `robots.JointGroup`.
 
     Each joint's own target would let those that nothing stops go on alone, so that jaws which hold
@@ -130,7 +130,7 @@ class SimulatedRobot:
         self.driven = [self.joints[i] for i in self.active_index]
         self.speeds = _speeds(descriptor, blueprint.model)
         self._set_drives()
-        self.linkages: list[Linkage] = []
+        self.linkages: list[DrivenLinkage] = []
         self.setters = list(self._setters())
         for link in self.links.values():
             link.disable_gravity = True
@@ -199,7 +199,7 @@ class SimulatedRobot:
         for group in self.descriptor.action_split.groups.values():
             joints = self.driven[first : first + len(group.joints)]
             if group.leaders:
-                self.linkages.append(Linkage(group, joints, self.articulation))
+                self.linkages.append(DrivenLinkage(group, joints, self.articulation))
                 yield from self.linkages[-1].setters
             else:
                 yield from (joint.set_drive_target for joint in joints)

@@ -11,21 +11,21 @@ import torch
 from numpy.typing import NDArray
 
 from robot_layouts.simulation.rotations import quaternion
-from robot_layouts.simulation.sapien3.backdrop import (
-    COLOR,
-    PLACE,
-    Backdrop,
-    Bodies,
-    planes,
-)
-from robot_layouts.simulation.sapien3.device import expect_render_device
-from robot_layouts.simulation.sapien3.dressing import (
-    Wardrobe,
+from robot_layouts.simulation.sapien3.appearance import (
+    Appearance,
     lamp_pose,
     light_color,
     shifted,
     widened,
 )
+from robot_layouts.simulation.sapien3.backdrop import (
+    COLOR,
+    PLACE,
+    Backdrop,
+    DrawnBodies,
+    planes,
+)
+from robot_layouts.simulation.sapien3.device import expect_render_device
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, View, camera_name
 from robot_layouts.simulation.scene.looks import AS_DECLARED, LIGHTS, Looks
@@ -76,10 +76,10 @@ class Studio:
         ]
         self._cameras: dict[tuple[Any, ...], Any] = {}
         self._markers = _markers(world)
-        self._bodies = Bodies(world)
+        self._bodies = DrawnBodies(world)
         self._backdrops: dict[Any, Backdrop] = {}
         self._looks = AS_DECLARED  # that it has
-        self._wardrobe: Wardrobe | None = None
+        self._appearance: Appearance | None = None
 
     def look(
         self, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
@@ -171,9 +171,9 @@ class Studio:
         self._looks = looks
         self._bodies.show_all()
         if looks.patterns or looks.paints:
-            if self._wardrobe is None:
-                self._wardrobe = Wardrobe(self._world)
-            self._wardrobe.dress(looks)
+            if self._appearance is None:
+                self._appearance = Appearance(self._world)
+            self._appearance.dress(looks)
             self._markers = _markers(self._world)
         *names, everywhere = LIGHTS
         for name, lamp, (direction, color) in zip(names, self._lamps, LAMPS, strict=True):
@@ -182,7 +182,7 @@ class Studio:
                 lamp.entity.set_pose(lamp_pose(direction, glow))
         if glow := looks.lights.get(everywhere):
             self._scene.set_ambient_light(light_color(SKY, glow))
-        self._bodies, self._backdrops = Bodies(self._world), {}
+        self._bodies, self._backdrops = DrawnBodies(self._world), {}
 
     def _add_camera(
         self, name: str, width: int, height: int, fov: float, near: float, far: float

@@ -33,7 +33,7 @@ from robots.descriptor import Vector3
 _MOST_TILT = 1.4  # rad from the vertical; light from the horizon and below lights no table
 
 
-class Wardrobe:
+class Appearance:
     """Dresses one world."""
 
     def __init__(self, world: BuiltWorld) -> None:
