@@ -3,8 +3,6 @@
 import copy
 import math
 import pickle
-import subprocess
-import sys
 
 import pytest
 from hypothesis import given
@@ -242,15 +240,6 @@ class TestText:
     def test_repr_is_short(self):
         layout = face_to_face(PANDAS, spacing=1.5)
         assert repr(layout) == "Layout(left=panda_wristcam, right=panda_wristcam)"
-
-
-def test_importing_layouts_loads_neither_simulator_nor_arrays():
-    heavy = {"sapien", "torch", "numpy", "matplotlib", "yaml", "trimesh", "fcl", "yourdfpy"}
-    script = f"import sys, layouts, layouts.__main__; print({heavy} & {{*sys.modules}})"
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "set()"
 
 
 class TestNonsense:
