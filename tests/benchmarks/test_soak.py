@@ -123,6 +123,7 @@ def levels_around(held) -> tuple[Level, Level, Level]:
     return before, during, read_level()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("held", "expected"),
     [

@@ -77,6 +77,7 @@ def test_a_worker_that_dies_is_told_and_its_episode_played_again(tmp_path):
     assert squares(events) == {seed: seed**2 for seed in range(6)}
 
 
+@pytest.mark.long
 def test_an_episode_that_kills_every_worker_is_given_up(tmp_path):
     events = run(Play(tmp_path, dies_at=1, always=True), range(9))
     assert [event.seed for event in events if event.died] == [1, 1, 1]
@@ -102,6 +103,7 @@ def test_a_fresh_process_for_every_episode():
     assert len({event.result[0] for event in events}) == 4
 
 
+@pytest.mark.long
 def test_what_an_episode_says_of_itself():
     events = list(ProcessExecutor(1).run(Play(says="halfway"), range(2)))
     said = [(event.seed, event.note or event.result[1]) for event in events]
@@ -184,6 +186,7 @@ def test_an_episode_that_hangs_again_and_again_is_given_up(tmp_path):
     assert sorted(squares(events)) == [0, 2]
 
 
+@pytest.mark.long
 def test_a_worker_that_is_stopped_while_it_answers(tmp_path):
     events = list(ProcessExecutor(1, episode_timeout=1.0).run(StopsHalfWay(tmp_path), range(3)))
     assert [event.seed for event in events if event.died] == [0]
@@ -223,6 +226,7 @@ def test_long_silence_is_said(monkeypatch):
 # -- what cannot be sent, loaded or understood ---------------------------------------------------
 
 
+@pytest.mark.long
 def test_what_no_worker_can_load_is_said_at_once():
     with pytest.raises(WorkerError, match="a worker cannot load .*: ModuleNotFoundError: .*mine"):
         run(CannotBeLoaded(), range(3), workers=1)

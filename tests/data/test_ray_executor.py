@@ -229,6 +229,7 @@ def test_what_cannot_begin(nodes, monkeypatch):
         run(nodes, Play(), range(3))
 
 
+@pytest.mark.long
 def test_a_cluster_that_is_not_there():
     pytest.importorskip("ray")
     with pytest.raises(WorkerError, match="Ray cluster at '127.0.0.77:1' cannot be joined: .*refu"):

@@ -48,6 +48,7 @@ def test_what_is_no_address(address):
         RayExecutor(address)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.77", "[::1]", "localhost"])
 def test_a_cluster_that_refuses(host):
     with pytest.raises(WorkerError, match=r"cluster at '.*:1' cannot be joined: .*refused"):
@@ -63,6 +64,7 @@ def test_a_port_that_is_silent(monkeypatch):
             next(RayExecutor(f"127.0.0.77:{port}").run(Play(), [0]))
 
 
+@pytest.mark.long
 def test_a_stale_address_in_the_environment(monkeypatch):
     monkeypatch.setenv("RAY_ADDRESS", "127.0.0.77:1")
     with pytest.raises(WorkerError, match="at 'auto' cannot be joined: .*refused; `ray start` on"):

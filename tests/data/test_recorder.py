@@ -510,6 +510,7 @@ def test_a_disk_that_fills_up_while_episodes_are_joined(small_disk, push_t):
     assert [p.name for p in sorted(small_disk.iterdir())] == ["trajectory.h5", "trajectory.json"]
 
 
+@pytest.mark.long
 def test_a_read_only_folder(tmp_path, push_t):
     env, episodes = push_t
     path = write(tmp_path / "recorded" / "trajectory.h5", env, episodes[:2])

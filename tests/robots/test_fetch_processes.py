@@ -108,6 +108,7 @@ def _locate(_: int) -> str:
     return str(UrdfLocator("maniskill_panda", "panda_v2.urdf").locate())
 
 
+@pytest.mark.long
 def test_spawned_workers_locate_at_once(store, physics, fill):
     fill(store, physics)
     with multiprocessing.get_context("spawn").Pool(2) as pool:
@@ -115,6 +116,7 @@ def test_spawned_workers_locate_at_once(store, physics, fill):
     assert found == {str(store.root / "maniskill_panda" / "panda_v2.urdf")}
 
 
+@pytest.mark.long
 def test_a_full_disk_is_named_and_leaves_no_half_file(store, physics):
     import resource
 
@@ -163,6 +165,7 @@ def test_a_wheel_without_a_file_is_named(wheel_index, store, physics):
         ensure(physics, store, [PackageWheel(MANI_SKILL)])
 
 
+@pytest.mark.long
 def test_what_pip_says_is_passed_on(wheel_index, store, physics):
     next(wheel_index.iterdir()).unlink()
     with pytest.raises(AssetError, match="pip failed: No matching distribution found"):
@@ -176,6 +179,7 @@ def test_a_python_without_pip_is_named(store, physics, monkeypatch):
         ensure(physics, store, [PackageWheel(MANI_SKILL)])
 
 
+@pytest.mark.long
 def test_uv_runs_pip_where_python_has_none(wheel_index, store, physics, monkeypatch, tmp_path):
     uv = tmp_path / "bin" / "uv"
     uv.parent.mkdir()

@@ -196,6 +196,7 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
     assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1, 1, 1]
 
 
+@pytest.mark.long
 def test_an_error_in_a_worker_is_told_with_its_place(shared):
     with pytest.raises(
         WorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*workers.py"
