@@ -14,7 +14,6 @@ import pytest
 import torch
 
 import robot_layouts.data.playing.scheduler
-from robot_layouts.data.playing.command_options import Players
 from robot_layouts.data.playing.executor import (
     Event,
     ProcessExecutor,
@@ -65,10 +64,6 @@ def test_every_seed_is_played_once(workers):
     assert os.getpid() not in players
 
 
-def test_nothing_to_play():
-    assert run(Play(), []) == []
-
-
 def test_a_worker_that_dies_is_told_and_its_episode_played_again(tmp_path):
     events = run(Play(tmp_path, dies_at=3), range(6))
     (death,) = [event for event in events if event.died is not None]
@@ -86,15 +81,6 @@ def test_an_episode_that_kills_every_worker_is_given_up(tmp_path):
     assert isinstance(given_up.error, WorkersDied)
     assert re.search("seed 1 ended 3 worker processes; .*SIGKILL", str(given_up.error))
     assert sorted(squares(events)) == [0, *range(2, 9)]
-
-
-@pytest.mark.long
-def test_one_attempt(tmp_path):
-    executor = ProcessExecutor(1, attempts=1)
-    events = list(executor.run(Play(tmp_path, dies_at=1, always=True), range(3)))
-    assert [event.seed for event in events if event.died] == [1]
-    assert "seed 1 ended 1 worker process; " in str(events[-2].error)
-    assert sorted(squares(events)) == [0, 2]
 
 
 @pytest.mark.long
@@ -355,11 +341,6 @@ def test_who_is_chosen():
             choose_executor(executor=own, **contradiction)
     with pytest.raises(TaskError, match="with workers=0 this process plays, and nothing could end"):
         choose_executor(0, episode_timeout=5.0)
-
-
-def test_commands_use_all_cores_unless_they_are_told_otherwise():
-    assert Players().executor().workers == len(os.sched_getaffinity(0))
-    assert Players(workers=3).executor().workers == 3
 
 
 def test_an_executor_that_forgets_episodes():

@@ -67,13 +67,6 @@ def test_no_task_is_imported_because_a_suite_names_it(folder, words, capsys):
     )
 
 
-def test_no_task_is_imported_because_a_suite_says_who_plays_it(folder):
-    text = f"policies: {{strange:ShortPush-v1: expert}}\n{SHARED.format('own')}"
-    with pytest.raises(TaskError, match="type: --task strange:ShortPush-v1"):
-        load_suite(written(folder, text))
-    _expect_untouched()
-
-
 @pytest.mark.parametrize(
     "layout",
     [
