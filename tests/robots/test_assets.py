@@ -17,7 +17,6 @@ from robots.assets.manifest import load_manifest
 from robots.assets.packages import INDEX_PACKAGES, MANI_SKILL, SourceError
 from robots.assets.sources import InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState
-from robots.fetch_assets import main
 from robots.urdf.summary import read_references
 from tests.catalogue import every_robot
 from tests.robots.conftest import PANDA, REAL_ROOT, contents
@@ -213,14 +212,6 @@ def test_a_read_only_destination_is_named(read_only_folder, physics):
         ensure(physics, AssetStore(read_only_folder / "x"), [InstalledPackage(MANI_SKILL)])
 
 
-def test_a_file_in_place_of_the_destination_is_named(tmp_path, physics):
-    (tmp_path / "file").touch()
-    store = AssetStore(tmp_path / "file")
-    assert store.unusable(physics) == list(physics)
-    with pytest.raises(AssetError, match="cannot write robot files to .*choose another folder"):
-        ensure(physics, store, [InstalledPackage(MANI_SKILL)])
-
-
 def test_a_complete_read_only_copy_is_enough(store, physics, fill, monkeypatch):
     fill(store, physics)
 
@@ -255,30 +246,6 @@ def test_a_damaged_record_is_written_anew_and_loses_nothing(store, physics, fill
     assert store.unusable(physics) == []
     assert capfd.readouterr().err.count(f"{record} is damaged: ") == 1
     assert list(json.loads(record.read_text())) == [str(physics[0])]
-
-
-def test_what_stands_in_place_of_a_file_is_exchanged_and_never_waited_for(store, physics, fill):
-    fill(store, physics)
-    fifo, link, device, sparse = (store.path(file) for file in physics[:4])
-    for path in (fifo, link, device):
-        path.unlink()
-    os.mkfifo(fifo)
-    link.symlink_to(link)
-    device.symlink_to("/dev/zero")
-    os.truncate(sparse, 10**13)
-    assert store.unusable(physics) == list(physics[:4])
-    ensure(physics, store, [FakeSource(right(physics))])
-    assert store.unusable(physics) == []
-    assert all(path.is_file() and not path.is_symlink() for path in (fifo, link, device, sparse))
-
-
-def test_a_home_of_nobody_is_named(monkeypatch, capsys):
-    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "~nobody_here/files")
-    with pytest.raises(AssetError, match="ROBOT_LAYOUTS_ASSETS is .*'~nobody_here' has no home"):
-        default_root()
-    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "/tmp")
-    assert main(["panda", "--dest", "~nobody_here"]) == 1
-    assert "--dest is '~nobody_here'" in capsys.readouterr().err
 
 
 def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
