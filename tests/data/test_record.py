@@ -188,20 +188,6 @@ def test_a_plan_that_was_rehearsed_is_recorded_without_being_played_again(
 
 
 @pytest.mark.long
-def test_a_worker_that_is_stopped(tmp_path):
-    process = start(*arguments(tmp_path, 40, episode_timeout=10))
-    wait_for_parts(tmp_path, 2)
-    (stopped,) = workers_of(process.pid)
-    os.kill(stopped, signal.SIGSTOP)
-    printed, said = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, said
-    assert f"worker process {stopped} did not finish the episode within 10 s and was ended" in said
-    assert f"replaced: worker process {stopped} did not" in printed
-    assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(40)))
-    wait_until_nobody_is_left(process)
-
-
-@pytest.mark.long
 def test_a_seed_without_a_plan_is_told_and_tried_again(tmp_path, capsys):
     for _ in range(2):
         assert main(arguments(tmp_path, 3, seed=NO_PLAN - 1)) == 1
