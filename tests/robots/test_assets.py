@@ -19,7 +19,7 @@ from robots.assets.sources import InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState
 from robots.urdf.summary import read_references
 from tests.catalogue import every_robot
-from tests.robots.conftest import PANDA, REAL_ROOT, contents
+from tests.robots.conftest import REAL_ROOT, contents
 
 pytestmark = pytest.mark.usefixtures("store")
 
@@ -71,12 +71,6 @@ def test_locate_tries_the_hub_then_the_installed_package(capfd):
     said = capfd.readouterr().err
     assert said.index("Hugging Face Hub") < said.index("installed mani_skill: 11 of 11 files")
     assert "licence CC BY-NC 4.0" in said
-
-
-def test_locate_says_nothing_once_the_files_are_there(store, physics, fill, capfd):
-    fill(store, physics)
-    assert UrdfLocator("maniskill_panda", "panda_v2.urdf").locate().is_file()
-    assert capfd.readouterr().err == ""
 
 
 def test_locate_names_the_closest_package_and_urdf():
@@ -257,10 +251,3 @@ def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
     monkeypatch.setattr(paths, "CHECKOUT_CACHE", tmp_path / "no_checkout")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert default_root() == tmp_path / "cache" / "robot-layouts"
-
-
-def test_pictures_are_a_superset_of_physics():
-    for urdf in PANDA.urdfs:
-        physics = set(PANDA.needed(urdf, pictures=False))
-        pictures = set(PANDA.needed(urdf, pictures=True))
-        assert physics == pictures if urdf in PANDA.undrawable else physics < pictures
