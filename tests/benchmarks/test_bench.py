@@ -2,9 +2,7 @@
 
 import json
 import multiprocessing
-import os
 import socket
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -12,17 +10,14 @@ import pytest
 
 import tasks
 from benchmarks.__main__ import main
-from benchmarks.bench import run as bench
 from benchmarks.bench.environments import Played
 from benchmarks.bench.measurement import BenchmarkError, Clock, Measurement, Settings
 from benchmarks.bench.plot import draw
 from benchmarks.bench.report import RECORD, Report, machine, read_report, summary
 from benchmarks.bench.run import BENCHMARKS, BESIDE_NATIVE
-from benchmarks.bench.vectors import Helpers
-from benchmarks.bench.worlds import crowd, make_pile
+from benchmarks.bench.worlds import make_pile
 from parity.native import make_native, native_action
 from robot_layouts.simulation.sapien3.backend import worlds_below
-from robots import MissingPackageError, SimulationError
 from tests.native import NATIVE
 from tests.quick import quick_cases
 
@@ -88,14 +83,6 @@ class TestFigures:
         settings.interleave(variants, rounds=1, warm_up=False)
         assert taken == [("a", 1), ("b", 1)]
 
-    def test_clocks(self):
-        before = time.process_time()
-        told = Clock(processor=True).now([os.getpid()]) - time.process_time()
-        assert before <= told <= time.process_time()
-        work = [(10, 2.0), (30, 3.0)]
-        assert Clock().rate(work) == 15
-        assert Clock(processor=True).rate(work) == 8, "processors are shared"
-
 
 class TestWhatIsTimed:
     def test_a_step_and_the_physics_alone_are_the_same_motion(self):
@@ -117,20 +104,6 @@ class TestWhatIsTimed:
         bodies = [world.bodies[name] for name in ("cube", *(f"pile{i}" for i in range(cubes)))]
         assert not any(body.component.is_sleeping for body in bodies)
         assert env.touching() >= pairs
-
-    def test_kinds_of_a_crowd_take_turns(self):
-        layout = crowd(3, ("panda", "so100"))
-        assert [place.robot.name for place in layout.values()] == ["panda", "so100", "panda"]
-
-    @pytest.mark.long
-    def test_a_process_that_dies_is_reported(self):
-        with pytest.raises(BenchmarkError, match="a process of a benchmark ended with 3"):
-            Helpers(1, _dies).__enter__()
-        assert not multiprocessing.active_children()
-
-
-def _dies(pipe) -> None:
-    os._exit(3)
 
 
 QUICK = ("reset", "step", "validation")  # the others start processes, draw, or take longer
@@ -216,18 +189,6 @@ class TestCommand:
         assert not [*tmp_path.iterdir()]
 
 
-@pytest.mark.parametrize("error", [MissingPackageError, SimulationError, BenchmarkError])
-def test_what_cannot_be_measured_is_left_out(error, capsys, monkeypatch):
-    def fail(settings):
-        raise error("pip install something")
-
-    monkeypatch.setattr(bench, "BENCHMARKS", {"broken": fail, "names": lambda _: NAMES})
-    report = bench.run(["broken", "names"], TINY)
-    assert report.measurements == (NAMES,)
-    assert report.left_out == {"broken": "pip install something"}
-    assert "broken is left out: pip install something" in capsys.readouterr().err
-
-
 def test_a_report_is_read_as_it_was_written(tmp_path):
     report = report_of(NUMBERS, NAMES)
     report.write(tmp_path)
@@ -262,11 +223,3 @@ class TestPlot:
         assert list(step.get_ydata()) == [3.0, 4.0]
         assert physics.get_linestyle() == "--"
         assert [text.get_text() for text in axes.get_legend().get_texts()] == ["step", "physics"]
-
-    def test_bars_over_names(self):
-        figure = draw([NAMES, NUMBERS], "Medians on a machine.")
-        axes, _ = figure.axes
-        assert [label.get_text() for label in axes.get_yticklabels()] == ["A-v1", "B-v1"]
-        assert [bar.get_width() for bar in axes.patches] == [1.5, 4.0, 2.0]
-        assert [text.get_text() for text in axes.texts] == ["1.50", "4.00", "2.00"]
-        assert figure.get_supxlabel() == "Medians on a machine."

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from math import radians, tan
 from pathlib import Path
 
 import numpy as np
@@ -14,18 +13,13 @@ from benchmarks.__main__ import main
 from benchmarks.bench.measurement import number_text
 from benchmarks.bench.report import read_report
 from benchmarks.gallery import pages as gallery
-from benchmarks.gallery.pages import FOLDER, _kind, _read, all_pages, complaints, solved
+from benchmarks.gallery.pages import FOLDER, _read, all_pages, complaints, solved
 from benchmarks.gallery.pictures import (
     BACKGROUND,
     LARGEST_CLIP,
     LARGEST_PORTRAIT,
-    LONGEST,
     PORTRAIT_SIZE,
-    Lens,
     portrait,
-    shrunk,
-    speed,
-    steps_per_frame,
 )
 from benchmarks.records import RecordError
 from parity.results import read_results
@@ -97,18 +91,6 @@ def test_what_was_altered_is_named_and_written_again(copy, capsys):
     assert len(list(copy.rglob("*.md"))) == 1 + len(TASKS) + len(ROBOTS)
 
 
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (["--pictures", "pandda"], "Did you mean 'panda'?"),
-        (["panda"], "names are taken by --measure and --pictures"),
-    ],
-)
-def test_bad_usage(words, complaint, capsys):
-    assert main(["gallery", *words]) == 2
-    assert complaint in capsys.readouterr().err
-
-
 class TestFigures:
     def test_of_experts_and_comparisons(self, pages):
         for task_id, found in _read()["tasks"].items():
@@ -132,10 +114,6 @@ class TestFigures:
             joints = RobotRegistry.load(name).joints
             assert all(f"| `{joint}` |" in pages[f"robots/{name}.md"] for joint in joints)
 
-    def test_robots_are_told_apart(self):
-        known = {"panda": "arm", "baxter": "several arms", "talos": "humanoid", "dclaw": "hand"}
-        assert {name: _kind(RobotRegistry.load(name)) for name in known} == known
-
 
 def test_what_the_record_lacks_is_named_with_the_command():
     record = _read()
@@ -143,29 +121,6 @@ def test_what_the_record_lacks_is_named_with_the_command():
     with pytest.raises(RecordError, match="no tasks PushT-v1; run `.* --measure PushT-v1`"):
         all_pages(record, FOLDER)
     assert solved({"episodes": 3, "failed": {"0": "dropped", "2": "late"}}) == [1]
-
-
-def test_all_points_just_fit_into_a_picture():
-    points = np.random.default_rng(0).uniform(-1, [1, 2, 3], (200, 3))
-    lens = Lens(radians(30), radians(20), radians(40), aspect=4 / 3, margin=0.1)
-    x, y, z = lens.axes() @ (points - lens.fitted(points)).T
-    slope = tan(lens.fov / 2) * 0.8
-    shares = np.array([abs(x) / (z * slope * lens.aspect), abs(y) / (z * slope)])
-    assert (z > 0).all()
-    assert shares.max() == pytest.approx(1)
-
-
-def test_pixels_are_means_and_what_is_empty_is_background():
-    rgb, solid = np.full((2, 4, 3), 100, np.uint8), np.zeros((2, 4, 1), bool)
-    solid[:, 0] = True
-    half = [(100 + b) / 2 for b in BACKGROUND]
-    assert shrunk(rgb, solid, 2).tolist() == [[np.round(half).tolist(), list(BACKGROUND)]]
-
-
-@pytest.mark.parametrize(("steps", "stride"), [(1, 2), (120, 2), (121, 3), (600, 10)])
-def test_long_episodes_are_shown_faster(steps, stride):
-    assert steps_per_frame(steps, 20) == stride
-    assert steps / 20 / speed(steps, 20) <= LONGEST
 
 
 @pytest.mark.long

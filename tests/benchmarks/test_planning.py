@@ -10,7 +10,6 @@ from benchmarks.__main__ import main
 from benchmarks.planning import (
     ALONE,
     FLOOR,
-    LARGE_REACH,
     Place,
     RandomPostures,
     random_cell,
@@ -19,8 +18,6 @@ from benchmarks.planning import (
 from layouts import face_to_face
 from robot_layouts.motion import Motion
 from robot_layouts.motion.collision.cell import Cell
-from robots import RobotRegistry
-from tests.three_links import arm, save
 
 LEANING = np.array([0, 0.9, 0, 0.6, 0, 0, 0, 0, 0])  # rad; of a Panda, from its start
 LINE = {
@@ -45,21 +42,6 @@ def test_a_seed_gives_one_cell_with_one_row_of_postures():
     first, second = (next(RandomPostures(cell, 0.01).drawn((1, 2, 3))) for _ in range(2))
     assert np.array_equal(first, second)
     assert cell.checker(clearance=0.01).free(first[None])[0]
-
-
-@pytest.mark.long
-def test_arms_come_from_urdfs_of_one_arm(tmp_path, monkeypatch):
-    save(tmp_path, arm(), "three_joints.urdf")
-    folders = {"toys": tmp_path, "shop": RobotRegistry.load("so100").urdf.locate().parent}
-    monkeypatch.setattr(planning, "package_folder", folders.__getitem__)
-    ((source, robot),) = planning._arms_of(tuple(folders)).items()
-    assert source == "shop/so100.urdf"
-    assert robot.name.endswith("_urdf")
-    assert len(robot.arm_joints) == 5
-    layout = random_cell(4, 4, [robot])
-    assert layout == random_cell(4, 4, [robot])
-    assert {p.robot.reach < LARGE_REACH for p in layout.values()} == {True}
-    assert 0 < sum(p.robot == robot for p in layout.values()) < 4
 
 
 def test_a_motion_on_which_robots_meet_is_seen_to_touch(monkeypatch):
@@ -96,17 +78,6 @@ def test_a_record_goes_on_where_it_stopped(tmp_path, capsys):
     assert row.endswith("| 2 of 2 |")
 
 
-def test_a_run_that_is_cut_off_has_seen_all_cells(tmp_path, monkeypatch):
-    asked = []
-    monkeypatch.setattr(planning, "_asked", lambda wanted, workers: asked.extend(wanted) or ())
-    words = ["--cells", "2", "--queries", "4", "--batch", "3", "--out", str(tmp_path / "a.jsonl")]
-    main(["planning", *words])
-    kinds = [(query.cell, query.kind) for query in asked]
-    first = ["out of reach", "in collision", "joints"]
-    assert kinds[:6] == [(cell, kind) for cell in (0, 1) for kind in first]
-    assert kinds[6:] == [(cell, kind) for cell in (0, 1) for kind in ("joints", "joints", "tcp")]
-
-
 def test_the_table_counts_every_miss():
     record = [
         LINE | SOLVED | EXECUTED | {"seconds": 0.1},
@@ -137,12 +108,3 @@ def test_a_page_shows_the_record(tmp_path):
         "Of the 2 arms, 1 were made by\n`RobotDescriptor.from_urdf` from URDFs of pybullet" in text
     )
     assert text.splitlines()[-1] == table_of(planning.read(record)).splitlines()[-1]
-
-
-@pytest.mark.long
-def test_what_a_check_of_collisions_costs_is_printed(capsys):
-    assert main(["collisions", "--states", "64", "--edges", "2"]) == 0
-    rows = [
-        line for line in capsys.readouterr().out.splitlines() if line.startswith("| 4 Pandas |")
-    ]
-    assert [row.count("|") for row in rows] == [8, 6]

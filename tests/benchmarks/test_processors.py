@@ -10,7 +10,6 @@ from platform import libc_ver
 
 import pytest
 
-from benchmarks import processors
 from benchmarks.processors import (
     EMULATOR,
     EXPERT,
@@ -64,22 +63,7 @@ def test_an_emulated_processor_computes_the_same():
     assert differences(FEW, native, play_under(settings()["Nehalem, as it is"], FEW))
 
 
-def test_differences_are_named_by_the_first_moment():
-    played = Played("PickCube-v1", 0, EXPERT, 0)
-    one = {"actions": ["a", "b"], "states": ["s", "t"], "observations": [], "rewards": ["r"]}
-    other = {"actions": ["a", "c"], "states": ["s", "t"], "observations": [], "rewards": []}
-    assert differences([played], [one], [other]) == {str(played): {"actions": 1, "rewards": -1}}
-    assert differences([played], [one], [one]) == {}
-    assert differences([played], [None], [one]) == {}
-
-
 @pytest.mark.long
 def test_a_process_that_ends_too_early_is_reported():
     with pytest.raises(SimulationError, match="after 0 of 1 episodes"):
         play_under(Setting("", {}), [Played("PickCubr-v1", 0, EXPERT, 0)])
-
-
-def test_an_emulator_that_is_missing(monkeypatch):
-    monkeypatch.setattr(processors, "EMULATOR", "qemu-none")
-    with pytest.raises(SimulationError, match=r"no program 'qemu-none' to emulate a Nehalem"):
-        play_under(settings()["Nehalem, portable"], FEW)

@@ -12,20 +12,14 @@ import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.soak import (
-    OWN_ROUNDS,
-    WORKER_ROUNDS,
     Level,
-    Soak,
     Soaked,
     between_laps,
     complaints,
-    grown,
     growth,
     read_level,
-    worst,
 )
-from robots import TaskError
-from tasks import list_tasks, register_task
+from tasks import register_task
 from tests.data import leaking_tasks
 from tests.fresh_process import in_fresh_process
 
@@ -83,28 +77,6 @@ def test_laps_are_compared_task_by_task():
     assert complaints(found) == []
 
 
-def test_it_takes_about_as_many_steps_as_asked_for():
-    wanted = Soak(2_000_000, tuple(list_tasks()), 32, 2, 3)
-    in_workers = wanted.worker_steps * wanted.num_envs * WORKER_ROUNDS
-    here = wanted.own_steps * wanted.own_envs * OWN_ROUNDS * wanted.laps
-    assert (in_workers + here) * len(wanted.tasks) == pytest.approx(2_000_000, rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("numbers", "message"),
-    [
-        ((0, 1, 1, 3), "steps is 0; it must be 1 or more"),
-        ((1, 1, 0, 3), "workers is 0; it must be 1 or more"),
-        ((1, 1, 1, 2), "laps is 2; it must be 3 or more"),
-        ((1, 2, 3, 3), "3 workers cannot share 2 environments"),
-    ],
-)
-def test_numbers_that_make_no_sense(numbers, message):
-    steps, *rest = numbers
-    with pytest.raises(TaskError, match=message):
-        Soak(steps, ("PickCube-v1",), *rest)
-
-
 @contextmanager
 def a_file():
     with open(os.devnull):
@@ -151,6 +123,7 @@ def levels_around(held) -> tuple[Level, Level, Level]:
     return before, during, read_level()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("held", "expected"),
     [
@@ -183,11 +156,3 @@ def test_what_is_held_is_counted(held, expected):
 )
 def test_only_what_keeps_rising_grows(values, least):
     assert growth([values]) >= least if least else growth([values]) <= 0
-
-
-def test_growth_of_every_quantity_and_the_worst():
-    one = grown([[level(k, 2 * k) for k in range(9)]])
-    other = grown([[level(3 * k, k) for k in range(9)]])
-    assert (one.memory, one.descriptors, one.threads) == (5, 10, 0)
-    together = worst((one, other))
-    assert (together.memory, together.descriptors, together.threads) == (15, 10, 0)

@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -79,20 +78,6 @@ class Play:
 
 
 @dataclass(frozen=True)
-class DiesOnce:
-    """The first worker to begin dies; the others play."""
-
-    folder: Path
-
-    def __call__(self):
-        try:
-            (self.folder / "died").touch(exist_ok=False)
-        except FileExistsError:
-            return Play().play
-        os._exit(7)
-
-
-@dataclass(frozen=True)
 class DiesAmidAnEpisode:
     """Prepares what ``prepare`` does; the first worker to say how far it is dies instead."""
 
@@ -129,17 +114,6 @@ class EveryOtherDies:
         return Play().play
 
 
-class HangsOnce(DiesOnce):
-    """The first worker to begin is stopped; the others play."""
-
-    def __call__(self):
-        try:
-            (self.folder / "hung").touch(exist_ok=False)
-        except FileExistsError:
-            return Play().play
-        os.kill(os.getpid(), signal.SIGSTOP)
-
-
 @dataclass(frozen=True)
 class StopsHalfWay:
     """The first worker is stopped while its answer is on the way."""
@@ -156,13 +130,6 @@ class StopsHalfWay:
             channel.socket.send(worker._HEAD.pack(number, 0, 2) + b"half of a reply")
             os.kill(os.getpid(), signal.SIGSTOP)
         return os.getpid(), seed**2
-
-
-class CannotBeLoaded:
-    """Makes plays where it was made, and cannot be unpickled anywhere else."""
-
-    def __reduce__(self):
-        return import_module, ("no_such_module_of_mine",)
 
 
 @dataclass(frozen=True)

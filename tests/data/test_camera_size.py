@@ -24,11 +24,13 @@ def looks(tmp_path, monkeypatch, renderer):
     monkeypatch.syspath_prepend(tmp_path)
 
 
+@pytest.mark.long
 def test_evaluate(capsys):
     assert main(["evaluate", *WORDS, "--camera-size", "16x12"]) == 0
     assert "0 of 1 episodes with success" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_record(tmp_path, capsys):
     out = tmp_path / "data"
     assert main(["record", *WORDS, "--camera-size", "16x12", "--out", str(out)]) == 0

@@ -14,9 +14,8 @@ import torch
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.core.processes.start import WorkerError
-from robot_layouts.data import Evaluation, Score, evaluate
-from robot_layouts.data.playing.executor import ProcessExecutor
+from robot_layouts.data import Score, evaluate
+from robot_layouts.data.playing.executor import ProcessExecutor, WorkerError
 from robot_layouts.experts import find_expert, registry
 from robots import TaskError, UnknownNameError
 from tasks.episode import REBUILT, play
@@ -116,12 +115,6 @@ def test_a_policy_of_a_notebook():
     assert played == "{1: 100}"
 
 
-@pytest.mark.parametrize("workers", [-1, -10, True, 2.5, "2"])
-def test_no_number_of_workers(workers):
-    with pytest.raises(TaskError, match="workers is .*; it must be an integer of 0 or more"):
-        evaluate(still, TASK, [0], workers=workers)
-
-
 @pytest.mark.parametrize("workers", [0, 1])
 def test_an_error_of_a_policy_comes_whole(workers):
     with pytest.raises(
@@ -163,17 +156,6 @@ def test_success_ends_an_episode():
     plan = find_expert("PushCube-v1")(tasks.make("PushCube-v1"), 0)
     assert found.successes == {0: True}
     assert 0 < found.lengths[0] <= len(plan)
-
-
-def test_how_it_reads():
-    scores = {seed: Score(seed % 3 > 0, seed / 2, 10 * seed) for seed in range(1, 5)}
-    found = Evaluation("PickCube-v1", "MyPolicy", scores)
-    assert found.success_rate == 0.75
-    assert str(found).splitlines() == [
-        "PickCube-v1, MyPolicy: 3 of 4 episodes with success (75.0%)",
-        "on average: return 1.25 (0.5 to 2), 25.0 steps (10 to 40)",
-        "no success: seed 3",
-    ]
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,6 @@ import multiprocessing
 import os
 import random
 import re
-import subprocess
-import sys
-import textwrap
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -16,22 +13,19 @@ import pytest
 import torch
 
 import robot_layouts.data.playing.scheduler
-from robot_layouts.core.processes.start import WorkerError
-from robot_layouts.data.playing.command_options import Players
-from robot_layouts.data.playing.executor import ProcessExecutor, choose_executor, play_all
+from robot_layouts.data.playing.executor import (
+    ProcessExecutor,
+    WorkerError,
+    choose_executor,
+    play_all,
+)
 from robot_layouts.data.playing.in_process import InProcessExecutor
-from robot_layouts.data.playing.scheduler import Event, WorkersDied
+from robot_layouts.data.playing.scheduler import Event
 from robots import TaskError
 from tests.data.plays import (
-    CannotBeLoaded,
-    DiesOnce,
     EveryOtherDies,
-    HangsOnce,
     Play,
     SaysAndRests,
-    StopsHalfWay,
-    cannot_prepare,
-    dies_before_it_is_ready,
     makes_what_cannot_be_pickled,
 )
 
@@ -62,10 +56,6 @@ def test_every_seed_is_played_once(workers):
     assert os.getpid() not in players
 
 
-def test_nothing_to_play():
-    assert run(Play(), []) == []
-
-
 def test_a_worker_that_dies_is_told_and_its_episode_played_again(tmp_path):
     events = run(Play(tmp_path, dies_at=3), range(6))
     (death,) = [event for event in events if event.died is not None]
@@ -74,31 +64,13 @@ def test_a_worker_that_dies_is_told_and_its_episode_played_again(tmp_path):
     assert squares(events) == {seed: seed**2 for seed in range(6)}
 
 
-def test_an_episode_that_kills_every_worker_is_given_up(tmp_path):
-    events = run(Play(tmp_path, dies_at=1, always=True), range(9))
-    assert [event.seed for event in events if event.died] == [1, 1, 1]
-    (given_up,) = [event for event in events if event.error]
-    assert given_up.seed == 1
-    assert isinstance(given_up.error, WorkersDied)
-    assert re.search("seed 1 ended 3 worker processes; .*SIGKILL", str(given_up.error))
-    assert sorted(squares(events)) == [0, *range(2, 9)]
-
-
-@pytest.mark.long
-def test_one_attempt(tmp_path):
-    executor = ProcessExecutor(1, attempts=1)
-    events = list(executor.run(Play(tmp_path, dies_at=1, always=True), range(3)))
-    assert [event.seed for event in events if event.died] == [1]
-    assert "seed 1 ended 1 worker process; " in str(events[-2].error)
-    assert sorted(squares(events)) == [0, 2]
-
-
 @pytest.mark.long
 def test_a_fresh_process_for_every_episode():
     events = list(ProcessExecutor(2, fresh=True).run(Play(), range(4)))
     assert len({event.result[0] for event in events}) == 4
 
 
+@pytest.mark.long
 def test_what_an_episode_says_of_itself():
     events = list(ProcessExecutor(1).run(Play(says="halfway"), range(2)))
     said = [(event.seed, event.note or event.result[1]) for event in events]
@@ -116,22 +88,6 @@ def test_episodes_that_cannot_be_played():
     assert re.fullmatch(rf"ZeroDivisionError: division by zero {place}", str(events[2].error))
     assert "in play\n    return 1 / 0" in str(events[2].error.__cause__)
     assert re.fullmatch(rf"SystemExit: enough {place}", str(events[3].error))
-
-
-@pytest.mark.long
-def test_workers_that_cannot_begin():
-    with pytest.raises(TaskError, match="nothing can be made here"):
-        run(cannot_prepare, range(3))
-    with pytest.raises(WorkerError, match="3 worker processes died before .* ended with code 7"):
-        run(dies_before_it_is_ready, range(3))
-
-
-@pytest.mark.long
-def test_a_worker_that_dies_before_it_is_ready_is_replaced(tmp_path):
-    events = run(DiesOnce(tmp_path), range(4), workers=1)  # with 2, the other may play all
-    (death,) = [event for event in events if event.died is not None]
-    assert death.seed is None
-    assert squares(events) == {seed: seed**2 for seed in range(4)}
 
 
 @pytest.mark.long
@@ -157,47 +113,6 @@ def test_stopping_early_leaves_no_process():
 
 
 @pytest.mark.long
-def test_an_episode_that_hangs_is_played_again(tmp_path):
-    executor = ProcessExecutor(2, episode_timeout=1.5)
-    events = list(executor.run(Play(tmp_path, hangs_at=1), range(6)))
-    (death,) = [event for event in events if event.died is not None]
-    assert death.seed == 1
-    assert death.died.endswith("did not finish the episode within 1.5 s and was ended")
-    assert sorted(event.seed for event in events if event.result) == list(range(6))
-    assert squares(events) == {seed: seed**2 for seed in range(6)}
-
-
-@pytest.mark.long
-def test_an_episode_that_hangs_again_and_again_is_given_up(tmp_path):
-    executor = ProcessExecutor(1, attempts=2, episode_timeout=0.5)
-    events = list(executor.run(Play(tmp_path, hangs_at=1, always=True), range(3)))
-    (given_up,) = [event for event in events if event.error]
-    assert isinstance(given_up.error, WorkersDied)
-    assert re.fullmatch(
-        r"the episode of seed 1 ended 2 worker processes; the last: worker process \d+ did not"
-        r" finish the episode within 0\.5 s and was ended",
-        str(given_up.error),
-    )
-    assert sorted(squares(events)) == [0, 2]
-
-
-def test_a_worker_that_is_stopped_while_it_answers(tmp_path):
-    events = list(ProcessExecutor(1, episode_timeout=1.0).run(StopsHalfWay(tmp_path), range(3)))
-    assert [event.seed for event in events if event.died] == [0]
-    assert squares(events) == {seed: seed**2 for seed in range(3)}
-
-
-@pytest.mark.long
-def test_a_worker_that_hangs_before_it_is_ready(tmp_path, monkeypatch):
-    monkeypatch.setattr(robot_layouts.data.playing.scheduler, "START_SECONDS", 15.0)
-    events = run(HangsOnce(tmp_path), range(3), workers=1)
-    (death,) = [event for event in events if event.died is not None]
-    assert death.seed is None
-    assert death.died.endswith("was not ready within 15 s and was ended")
-    assert len(squares(events)) == 3
-
-
-@pytest.mark.long
 def test_a_word_shows_that_an_episode_goes_on():
     executor = ProcessExecutor(1, episode_timeout=3.0)
     events = list(executor.run(SaysAndRests(words=5, pause=1.0), [2]))
@@ -218,55 +133,6 @@ def test_long_silence_is_said(monkeypatch):
 
 
 # -- what cannot be sent, loaded or understood ---------------------------------------------------
-
-
-def test_what_no_worker_can_load_is_said_at_once():
-    with pytest.raises(WorkerError, match="a worker cannot load .*: ModuleNotFoundError: .*mine"):
-        run(CannotBeLoaded(), range(3), workers=1)
-
-
-@pytest.mark.long
-def test_a_session_without_a_file():
-    """As in a notebook: what a cell defines is refused before anything is started."""
-    program = """
-        import multiprocessing
-        from robot_layouts.data.playing.executor import ProcessExecutor, WorkerError
-
-        def cell():
-            return str
-
-        class Cell:
-            def __call__(self):
-                return str
-
-        for prepare in (cell, Cell(), Cell):
-            try:
-                next(ProcessExecutor(1).run(prepare, [0]))
-            except WorkerError as error:
-                print(error, len(multiprocessing.active_children()))
-    """
-    words = [sys.executable, "-c", textwrap.dedent(program)]
-    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
-    for line, name in zip(done.stdout.splitlines(), ("cell", "Cell", "Cell"), strict=True):
-        assert line.startswith(f"{name} is defined in this notebook or interactive session")
-        assert line.endswith("0")  # processes
-    assert done.stderr == ""
-
-
-@pytest.mark.long
-def test_a_program_without_a_guard(tmp_path):
-    (tmp_path / "program.py").write_text(
-        "from robot_layouts.data.playing.executor import ProcessExecutor\n"
-        "from tests.data.plays import Play\n"
-        "list(ProcessExecutor(2).run(Play(), range(3)))\n"
-    )
-    env = {**os.environ, "PYTHONPATH": str(ROOT)}
-    words = [sys.executable, str(tmp_path / "program.py")]
-    done = subprocess.run(words, env=env, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 1
-    last = done.stderr.splitlines()[-1]
-    assert "worker processes died before they could play anything" in last
-    assert last.endswith("runs belongs under `if __name__ == '__main__':`")
 
 
 @pytest.mark.long
@@ -365,11 +231,6 @@ def test_who_is_chosen():
             choose_executor(executor=own, **contradiction)
     with pytest.raises(TaskError, match="with workers=0 this process plays, and nothing could end"):
         choose_executor(0, episode_timeout=5.0)
-
-
-def test_commands_use_all_cores_unless_they_are_told_otherwise():
-    assert Players().executor().workers == len(os.sched_getaffinity(0))
-    assert Players(workers=3).executor().workers == 3
 
 
 def test_an_executor_that_forgets_episodes():

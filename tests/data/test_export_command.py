@@ -55,12 +55,6 @@ def test_the_command_writes_a_dataset_and_says_so(recording, tmp_path, capsys):
     assert [path.name for path in out.parent.iterdir()] == ["dataset"]
 
 
-def test_an_empty_folder_may_be_there_already(recording, tmp_path):
-    (tmp_path / "out").mkdir()
-    assert run(recording, "--format", "robomimic", "--out", tmp_path / "out") == 0
-    assert (tmp_path / "out/low_dim.hdf5").is_file()
-
-
 @pytest.mark.parametrize("more", [(), ("--only-successes",)])  # which says what happens anyway
 def test_failures_are_left_out(recording, tmp_path, capsys, more):
     succeed(recording, 0, 2)
@@ -232,11 +226,6 @@ def test_options_of_another_format_are_refused(recording, tmp_path, capsys, word
     assert run(recording, "--format", "robomimic", "--out", tmp_path / "out", *words) == 1
     expected = f"a robomimic dataset has no {words[0][2:]} here; leave it out, or choose"
     assert expected in capsys.readouterr().err
-
-
-def test_a_rate_is_one_or_more(recording, tmp_path, capsys):
-    assert run(recording, "--format", "lerobot", "--out", tmp_path / "out", "--fps", 0) == 1
-    assert "fps is 0; it must be 1 or more" in capsys.readouterr().err
 
 
 def test_without_a_vulkan_driver_a_video_is_refused(recording, tmp_path, capsys, monkeypatch):

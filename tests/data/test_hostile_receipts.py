@@ -25,17 +25,6 @@ def copy(receipt, tmp_path) -> Path:
     return Path(shutil.copy(receipt, tmp_path))
 
 
-def _cut(text: str, share: float) -> str:
-    return text[: int(len(text) * share)]
-
-
-@pytest.mark.parametrize("share", [0, 0.001, 0.3, 0.7, 0.99])
-def test_a_truncated_receipt(copy, share, capsys):
-    copy.write_text(_cut(copy.read_text(), share))
-    assert main(["verify", str(copy), "--workers=0"]) == 1
-    assert capsys.readouterr().err.startswith(f"error: cannot read {copy}: it is not json")
-
-
 def _set(*path):
     *keys, last, value = path
 
@@ -155,46 +144,6 @@ def test_no_policy_is_imported_because_a_receipt_names_it(copy, called, name, ca
         f"error: the receipt is of the policy {name}, and a receipt does not choose which code"
         f" runs; to play what is here, type: --policy {shlex.quote(name)}\n"
     )
-
-
-@pytest.mark.parametrize("module", ["antigravity", "strange"])
-def test_no_task_is_imported_because_a_receipt_names_it(copy, called, module, capsys):
-    edit(
-        copy,
-        lambda found: found["task"].update(
-            {"id": "Flight-v1", "class": f"{module}:Flight", "sha256": _hash_of(module)}
-        ),
-    )
-    assert console.main(["verify", copy.name, "--workers=0"]) == 1
-    _expect_untouched(called)
-    assert capsys.readouterr().err == (
-        "error: the receipt is of the task Flight-v1, which nothing installed lists, and a receipt"
-        f" does not choose which code runs; to play what is here, type: --task {module}:Flight-v1\n"
-    )
-
-
-@pytest.mark.parametrize("robot", ["strange:ROBOT", "./strange.xacro"])
-def test_no_robot_is_imported_because_a_receipt_names_it(copy, called, robot, capsys):
-    shutil.copy("strange.py", "strange.xacro")
-    edit(copy, lambda found: found["making"]["layout"]["arm"].update(robot=robot))
-    words = ["verify", copy.name, "--workers=0", f"--policy={NAMED}"]
-    assert console.main(words) == 1
-    _expect_untouched(called)
-    assert f"unknown robot '{robot}'" in capsys.readouterr().err
-
-
-TEMPLATE = """<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="r">
-<xacro:include filename="$(cwd)/elsewhere"/></robot>"""
-
-
-def test_no_template_is_expanded_because_a_receipt_names_it(copy, called):
-    """Its expressions are a program; whoever sends a receipt may send one along."""
-    Path("arm.urdf").write_text(TEMPLATE)
-    own = {"urdf": "arm.urdf", "sha256": sha256(TEMPLATE.encode()).hexdigest()}
-    guessed = {"arm": {**own, "descriptor": "0" * 64}}
-    edit(copy, lambda found: found["environment"].update(guessed=guessed))
-    with pytest.raises(ReceiptError, match="arm.urdf, a xacro template, .*--robots arm="):
-        again(copy, policy=NAMED)
 
 
 def test_a_robot_for_a_place_that_there_is_not(receipt):

@@ -16,9 +16,7 @@ import pytest
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.reading import hdf5
 from robot_layouts.data.reading.hdf5 import ContentError, Hdf5File, LimitError, limited
-from robot_layouts.data.reading.json_files import TrajectoryError
-from robot_layouts.data.reading.recording import Recording
-from robots import UnreadableFileError
+from robot_layouts.data.reading.recording import Recording, TrajectoryError
 from tests.data.recordings import edited, record
 
 SECRET = b"root:x:0:0: a secret in another file\n" * 20
@@ -132,14 +130,6 @@ def test_every_value_of_the_attributes_is_looked_at(path, layout, why):
     with edited(path) as file:
         file.attrs["layout"] = layout if isinstance(layout, str) else json.dumps(layout)
     with pytest.raises(TrajectoryError, match=why):
-        Recording(path)
-
-
-@pytest.mark.parametrize("name", ["trajectory.h5", "trajectory.json"])
-def test_a_fifo_is_not_waited_for(path, name):
-    path.with_name(name).unlink()
-    os.mkfifo(path.with_name(name))
-    with pytest.raises(TrajectoryError, match="it is a FIFO, not a regular file"):
         Recording(path)
 
 
@@ -284,7 +274,3 @@ class TestOpenFiles:
                 os._exit(0 if len(file.numbers("traj_1")["actions"]) == 4 else 1)
             assert os.waitpid(child, 0)[1] == 0
             assert len(file.numbers("traj_1")["actions"]) == 4
-
-    def test_a_missing_file_is_named(self, tmp_path):
-        with pytest.raises(UnreadableFileError, match="No such file"):
-            Hdf5File(tmp_path / "none.h5")

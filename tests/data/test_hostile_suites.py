@@ -30,11 +30,6 @@ class ShortPush(PushT):
 """
 OWN = "name: x\nseeds: 1\ntasks: [strange:ShortPush-v1]"
 SHARED = "name: x\nseeds: 1\ntasks: [{{task: PickCube-v1, layout: {}}}]"
-LOOKING = [
-    ["show", "suite.yaml"],
-    ["report", "."],
-    ["verify", ".", "--workers=0"],
-]
 
 
 @pytest.fixture
@@ -52,25 +47,6 @@ def folder(tmp_path, monkeypatch) -> Path:
 def _expect_untouched() -> None:
     assert "strange" not in sys.modules
     assert not Path("ran").exists()
-
-
-@pytest.mark.parametrize("words", LOOKING, ids=lambda words: words[0])
-def test_no_task_is_imported_because_a_suite_names_it(folder, words, capsys):
-    (folder / "suite.yaml").write_text(OWN)
-    assert console.main(["suite", *words]) == 1
-    _expect_untouched()
-    assert capsys.readouterr().err.endswith(
-        "task 1 (strange:ShortPush-v1): nothing installed lists strange:ShortPush-v1, and a file"
-        " does not choose which code runs; if you trust its module, type: --task"
-        " strange:ShortPush-v1 (in Python, import it first)\n"
-    )
-
-
-def test_no_task_is_imported_because_a_suite_says_who_plays_it(folder):
-    text = f"policies: {{strange:ShortPush-v1: expert}}\n{SHARED.format('own')}"
-    with pytest.raises(TaskError, match="type: --task strange:ShortPush-v1"):
-        load_suite(written(folder, text))
-    _expect_untouched()
 
 
 @pytest.mark.parametrize(

@@ -230,12 +230,6 @@ def test_what_cannot_begin(nodes, monkeypatch):
         run(nodes, Play(), range(3))
 
 
-def test_a_cluster_that_is_not_there():
-    pytest.importorskip("ray")
-    with pytest.raises(WorkerError, match="Ray cluster at '127.0.0.77:1' cannot be joined: .*refu"):
-        next(RayExecutor("127.0.0.77:1").run(Play(), [0]))
-
-
 def test_ray_is_not_installed(monkeypatch, tmp_path, capsys):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[ray\]'"):

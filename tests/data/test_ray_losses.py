@@ -48,47 +48,6 @@ def test_what_is_no_address(address):
         RayExecutor(address)
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.77", "[::1]", "localhost"])
-def test_a_cluster_that_refuses(host):
-    with pytest.raises(WorkerError, match=r"cluster at '.*:1' cannot be joined: .*refused"):
-        next(RayExecutor(f"{host}:1").run(Play(), [0]))
-
-
-@pytest.mark.long
-def test_a_port_that_is_silent(monkeypatch):
-    monkeypatch.setattr(robot_layouts.data.playing.ray_cluster, "_JOIN_SECONDS", 3.0)
-    with socket.create_server(("127.0.0.77", 0)) as silent:
-        port = silent.getsockname()[1]
-        with pytest.raises(WorkerError, match="cannot be joined: it does not answer within 3 s"):
-            next(RayExecutor(f"127.0.0.77:{port}").run(Play(), [0]))
-
-
-def test_a_stale_address_in_the_environment(monkeypatch):
-    monkeypatch.setenv("RAY_ADDRESS", "127.0.0.77:1")
-    with pytest.raises(WorkerError, match="at 'auto' cannot be joined: .*refused; `ray start` on"):
-        next(RayExecutor("auto").run(Play(), [0]))
-
-
-@pytest.mark.long
-def test_an_actor_that_is_stopped(nodes):
-    played, stopped = [], None
-    executor = RayExecutor(nodes.address, modules=MODULES, episode_timeout=4.0)
-    for event in executor.run(Play(lasts=0.2), range(30)):
-        played.append(event)
-        if stopped is None and event.result is not None:
-            stopped = event.result[0]
-            os.kill(stopped, signal.SIGSTOP)
-    (death,) = [event for event in played if event.died is not None]
-    assert re.fullmatch(
-        rf"worker process {stopped} on node 127\.0\.0\.\d+ did not finish the episode within 4 s"
-        " and was ended",
-        death.died,
-    )
-    assert squares(played) == {seed: seed**2 for seed in range(30)}
-    assert len([event for event in played if event.result is not None]) == 30
-    nodes.wait_for_no_player()
-
-
 @pytest.mark.long
 def test_an_actor_that_is_stopped_before_it_is_ready(nodes, monkeypatch, tmp_path):
     monkeypatch.setattr(robot_layouts.data.playing.scheduler, "START_SECONDS", 30.0)

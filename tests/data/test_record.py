@@ -16,8 +16,6 @@ import pytest
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.core.processes.start import WorkerError
-from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.record import record
 from robot_layouts.data.recording.recorder import Recorder
@@ -187,31 +185,6 @@ def test_a_plan_that_was_rehearsed_is_recorded_without_being_played_again(
     recorded = sum(score.steps for score in summary.played.values())
     assert steps["once"] == recorded < steps["again"]
     assert same_files(tmp_path / "once" / FILE, tmp_path / "again" / FILE)
-
-
-def test_an_executor_that_forgets_episodes(tmp_path):
-    class Forgets(InProcessExecutor):
-        def run(self, prepare, seeds):
-            yield from super().run(prepare, seeds[1:])
-
-    with pytest.raises(WorkerError, match="Forgets ended before 1 of 3 episodes were played"):
-        record(TASK, range(3), tmp_path, Forgets())
-    with Recording(tmp_path / FILE) as file:
-        assert file.seeds == (1, 2)
-
-
-@pytest.mark.long
-def test_a_worker_that_is_stopped(tmp_path):
-    process = start(*arguments(tmp_path, 40, episode_timeout=10))
-    wait_for_parts(tmp_path, 2)
-    (stopped,) = workers_of(process.pid)
-    os.kill(stopped, signal.SIGSTOP)
-    printed, said = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 0, said
-    assert f"worker process {stopped} did not finish the episode within 10 s and was ended" in said
-    assert f"replaced: worker process {stopped} did not" in printed
-    assert same_files(tmp_path / FILE, recorded_directly(tmp_path / "direct" / FILE, range(40)))
-    wait_until_nobody_is_left(process)
 
 
 @pytest.mark.long

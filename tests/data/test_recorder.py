@@ -123,15 +123,6 @@ def test_a_replay_from_the_file_is_the_same_to_the_last_bit(recorded):
             np.testing.assert_array_equal(group["rewards"], again.rewards)
 
 
-def test_the_first_state_is_the_one_after_the_reset(recorded):
-    recorder, _ = recorded
-    env = tasks.make(TASK)
-    env.reset(SEEDS[1])
-    with h5py.File(recorder.path) as file:
-        first = file["traj_1/env_states/actors/cube"][0]
-    np.testing.assert_array_equal(first, env.get_state_dict()["actors"]["cube"].numpy()[0])
-
-
 KILLED = """
 import sys, numpy as np, tasks
 from tasks.episode import play
@@ -286,21 +277,6 @@ def test_a_part_that_is_torn_or_changed_is_recorded_again(tmp_path, push_t, dama
     assert same_files(path, write(tmp_path / "whole.h5", env, episodes[:2]))
 
 
-@pytest.mark.parametrize("put", [os.mkfifo, Path.mkdir, lambda path: path.write_text("mine")])
-@pytest.mark.parametrize("name", ["seed-0000000001.part", "seed-0000000xyz.part", "notes"])
-def test_what_is_no_part_is_refused_and_stays(tmp_path, push_t, put, name):
-    env, episodes = push_t
-    path = write(tmp_path / "joined.h5", env, episodes[:1])
-    parts = path.with_suffix(".parts")
-    parts.mkdir()
-    put(parts / name)
-    if name == "seed-0000000001.part" and (parts / name).is_file():
-        return  # a damaged part
-    with pytest.raises(RecordingError, match=f"{name} is no episode of this library, in a folder"):
-        Recorder(path, env, resume=True)
-    assert [p.name for p in parts.iterdir()] == [name]
-
-
 def test_a_folder_of_parts_with_something_else_in_it_stays(tmp_path, push_t):
     env, episodes = push_t
     path = tmp_path / "recording.h5"
@@ -308,25 +284,6 @@ def test_a_folder_of_parts_with_something_else_in_it_stays(tmp_path, push_t):
         recorder.add(episodes[0])
         (recorder.parts / "notes").write_text("mine")
     assert [p.name for p in recorder.parts.iterdir()] == ["notes"]
-
-
-def test_parts_with_each_others_name_are_recorded_again(tmp_path, push_t):
-    env, episodes = push_t
-    path = tmp_path / "swapped.h5"
-    recorder = Recorder(path, env)
-    for episode in episodes[:3]:
-        recorder.add(episode)
-    one, other, between = (part_path(recorder.parts, seed) for seed in (0, 1, 99))
-    one.rename(between)
-    other.rename(one)
-    between.rename(other)
-    del recorder
-    with Recorder(path, env, resume=True) as again:
-        assert again.seeds == {2}
-        assert again.damaged == [str(one), str(other)]
-        for episode in episodes[:2]:
-            again.add(episode)
-    assert same_files(path, write(tmp_path / "whole.h5", env, episodes[:3]))
 
 
 @pytest.mark.parametrize("array", ["actions", "rewards", "env_states/actors/Tee"])
@@ -365,15 +322,6 @@ def test_episodes_in_another_order_are_put_in_theirs(tmp_path, push_t):
             file.move(old, new)
     Recorder(path, env, resume=True).close()
     assert same_files(path, whole)
-
-
-@pytest.mark.parametrize("suffix", [".h5", ".json", ".parts"])
-def test_a_fifo_in_the_place_of_a_recording_is_not_waited_for(tmp_path, push_t, suffix):
-    env, _ = push_t
-    path = tmp_path / "recording.h5"
-    os.mkfifo(path.with_suffix(suffix))
-    with pytest.raises(RecordingError, match=f"recording{suffix}"):
-        Recorder(path, env, resume=True)
 
 
 def test_one_episode_per_seed(tmp_path, push_t):
@@ -510,6 +458,7 @@ def test_a_disk_that_fills_up_while_episodes_are_joined(small_disk, push_t):
     assert [p.name for p in sorted(small_disk.iterdir())] == ["trajectory.h5", "trajectory.json"]
 
 
+@pytest.mark.long
 def test_a_read_only_folder(tmp_path, push_t):
     env, episodes = push_t
     path = write(tmp_path / "recorded" / "trajectory.h5", env, episodes[:2])
@@ -539,12 +488,6 @@ def test_an_existing_recording_is_not_overwritten_unasked(tmp_path):
         assert list(file) == ["traj_0"]
     with Recorder(path, env, overwrite=True) as recorder:
         assert len(recorder) == 0
-
-
-def test_a_place_that_cannot_be_written_is_named(tmp_path):
-    (tmp_path / "file").write_text("not a folder")
-    with pytest.raises(RecordingError, match=r"cannot write .*file/trajectory\.h5"):
-        Recorder(tmp_path / "file" / "trajectory.h5", tasks.make("PushT-v1"))
 
 
 def test_writing_after_the_end_is_an_error(tmp_path):

@@ -104,6 +104,7 @@ def at(session, arm, pose):
     return np.allclose(session.targets[arm], pose, atol=1e-6)
 
 
+@pytest.mark.long
 def test_two_browsers_steer_an_arm_each_and_one_takes_it_from_the_other(cell):
     session = cell.session
     with browsers(cell, 2) as (one, other):

@@ -110,9 +110,6 @@ class TestText:
     def test_what_is_broken(self, root, text, broken):
         assert broken_in_text(text, root / "docs" / "page.md", root) == broken
 
-    def test_anchors_are_those_of_code_hosts(self):
-        assert anchors_of("# A b\n## C: d, `e`\n```\n# no\n```\n") == {"a-b", "c-d-e"}
-
 
 @pytest.mark.parametrize(
     ("html", "address"),

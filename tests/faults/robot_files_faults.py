@@ -234,13 +234,6 @@ def _chain(count: int, kind: str) -> str:
     return robot(*parts)
 
 
-def _star(count: int) -> str:
-    parts = [link("base")]
-    for i in range(1, count):
-        parts += [f'<link name="l{i}"/>', joint(f"j{i}", "base", f"l{i}")]
-    return robot(*parts)
-
-
 # --- what the bytes are ---------------------------------------------------------------------------
 
 

@@ -46,11 +46,6 @@ def _link_to(target: str) -> Callable[[Path], None]:
     return lambda path: path.symlink_to(target)
 
 
-def _link_to_fifo(path: Path) -> None:
-    os.mkfifo(path.with_suffix(".fifo"))
-    path.symlink_to(path.with_suffix(".fifo"))
-
-
 _NO_FILES: dict[str, Callable[[Path], None]] = {
     "a link to /dev/zero": _link_to("/dev/zero"),
     "a link to a FIFO": lambda path: (os.mkfifo(f"{path}.fifo"), path.symlink_to(f"{path}.fifo"))[

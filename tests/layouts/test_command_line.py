@@ -105,6 +105,7 @@ def test_an_error_is_one_line(words, message, capsys):
     assert err.count("\n") == 1
 
 
+@pytest.mark.long
 def test_it_runs_as_a_module():
     command = [sys.executable, "-m", "layouts", "show", "single", "arm=panda"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -4,18 +4,16 @@ from dataclasses import replace
 from itertools import combinations
 from xml.etree import ElementTree
 
-import mujoco
 import numpy as np
 import pytest
-import trimesh
 
 from layouts import Layout, Placement, ceiling, single, table
 from layouts.export.cell import ExportedCell
 from layouts.export.mjcf import TIMESTEPS
 from robot_layouts.kinematics.rotations import pose_matrix
-from robots import AssetError, CameraMount, LayoutError, RobotDescriptor
+from robots import AssetError, CameraMount, LayoutError
 from robots.bodies.hulls import load_model
-from tests.layouts.travelling import OUTSIDE, link_poses, outside
+from tests.layouts.travelling import link_poses, outside
 
 # Numbers that MuJoCo needs are exact to the last bit when read back.
 EXACT = 1e-12  # m
@@ -187,55 +185,6 @@ def test_the_timestep_is_one_at_which_drives_are_stable(tmp_path):
         path = single({"arm": robot}).to_mjcf(tmp_path / "arm.xml")
         option = ElementTree.parse(path).getroot().find("option")
         assert float(option.get("timestep")) == step
-
-
-# Corners and faces of meshes that are little more than nothing, and whether they are drawn.
-ODD_MESHES = {
-    "a triangle": ([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0)], [(0, 1, 2)], True),
-    "a triangle with two sides": (
-        [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0)],
-        [(0, 1, 2), (2, 1, 0)],
-        True,
-    ),
-    "flat": ([(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), (0.1, 0.1, 0)], [(0, 1, 2), (1, 3, 2)], True),
-    "a line": ([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], [(0, 1, 2)], False),
-    "a point": ([(1, 1, 1)] * 4, [(0, 1, 2), (1, 2, 3)], False),
-    "of no size once it is saved": (
-        [(500, 500, 500), (500.00001, 500, 500), (500, 500.00001, 500)],
-        [(0, 1, 2)],
-        False,
-    ),
-    "a body of 10 µm": (
-        [(0, 0, 0), (1e-5, 0, 0), (0, 1e-5, 0), (0, 0, 1e-5)],
-        [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)],
-        True,
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", ["visual", "collision"])
-@pytest.mark.parametrize("what", ODD_MESHES)
-def test_mujoco_reads_what_comes_of_odd_meshes(what, kind, tmp_path):
-    corners, faces, drawn = ODD_MESHES[what]
-    trimesh.Trimesh(corners, faces, process=False).export(tmp_path / "odd.obj")
-    odd, box = '<mesh filename="odd.obj"/>', '<box size="0.1 0.1 0.1"/>'
-    shapes = {"visual": box, "collision": box, kind: odd}
-    path = tmp_path / "odd.urdf"
-    path.write_text(
-        OUTSIDE.replace(
-            "</robot>",
-            '<link name="odd">'
-            + "".join(f"<{k}><geometry>{s}</geometry></{k}>" for k, s in shapes.items())
-            + '</link><joint name="odd" type="fixed"><parent link="tip"/><child link="odd"/>'
-            "</joint></robot>",
-        )
-    )
-    robot = RobotDescriptor.from_urdf(path, quiet=True)
-    model = mujoco.MjModel.from_xml_path(str(single({"arm": robot}).to_mjcf(tmp_path / "cell.xml")))
-    odd = model.body("arm/odd").id
-    geoms = (model.geom_group[model.geom_bodyid == odd]).tolist()
-    solid = kind == "visual" or what == "a body of 10 µm"
-    assert geoms == [2] * (drawn or kind == "collision") + [3] * solid
 
 
 def test_nothing_is_half_done(tmp_path, monkeypatch):

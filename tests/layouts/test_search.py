@@ -250,6 +250,7 @@ def test_a_long_search_tells_how_far_it_is(monkeypatch, capsys):
     assert "looking for places: beginning 1, " in said
 
 
+@pytest.mark.long
 def test_the_function_is_no_module():
     assert callable(layouts.search)
     assert "search" in layouts.__all__

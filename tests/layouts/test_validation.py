@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import subprocess
 import sys
 from dataclasses import replace
 
@@ -565,27 +564,8 @@ class TestPicture:
         assert len(figure.axes[0].texts) >= 4 + 3
         assert overlapping(figure.axes[0].texts) == []
 
-    def test_an_unsupported_ending_names_the_supported_ones(self, tmp_path):
-        report = Layout({"arm": Placement("panda")}).validate(workspaces=False)
-        with pytest.raises(LayoutError, match=r"must end in .png, .pdf or .svg"):
-            report.picture(tmp_path / "cell.jpg")
-
-    def test_without_matplotlib_the_error_names_the_command(self, monkeypatch, tmp_path):
-        report = Layout({"arm": Placement("panda")}).validate(workspaces=False)
-        monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-        with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[preview\]'"):
-            report.picture(tmp_path / "cell.png")
-
 
 def test_without_fcl_the_error_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "fcl", None)
     with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[checks\]'"):
         side_by_side(PANDAS, spacing=0.3).validate()
-
-
-def test_importing_layouts_loads_none_of_it():
-    script = "import sys, layouts; print({'fcl', 'trimesh', 'scipy', 'yourdfpy'} & {*sys.modules})"
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "set()"

@@ -1,8 +1,5 @@
 """``python -m layouts validate``: the report, the picture, the exit status."""
 
-import subprocess
-import sys
-
 import pytest
 
 from layouts import side_by_side
@@ -64,9 +61,3 @@ def test_an_error_is_one_line(words, message, capsys):
     assert err.startswith("error: ")
     assert message in err
     assert err.count("\n") == 1
-
-
-def test_it_runs_as_a_module():
-    command = [sys.executable, "-m", "layouts", "validate", "single", "arm=panda"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.startswith("ok: 1 robot, 8 action numbers\n")

@@ -1,7 +1,6 @@
 """What a page of a layout shows, where it is served, and how it ends; no browser needed."""
 
 import socket
-import subprocess
 import sys
 import urllib.request
 from urllib.parse import urlsplit
@@ -100,12 +99,6 @@ def test_a_missing_package_is_told_with_the_command_that_installs_it(monkeypatch
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(MissingPackageError, match=r"pip install 'robot-layouts\[view\]'"):
         save_html(make_cell(), tmp_path / "cell.html")
-
-
-def test_importing_layouts_loads_no_viewer():
-    code = "import sys, layouts, layouts.__main__; print({'viser', 'trimesh'} & set(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "set()"
 
 
 def test_links_stand_where_yourdfpy_puts_them():

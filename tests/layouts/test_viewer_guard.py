@@ -9,10 +9,9 @@ from urllib.parse import urlsplit
 
 import msgspec
 import pytest
-from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 from layouts.viewer import ViewerError
-from layouts.viewer.guard import MOST_CLIENTS, REFUSAL, Guard
+from layouts.viewer.guard import REFUSAL, Guard
 from layouts.viewer.page import NO_SLIDERS, save_html
 from layouts.viewer.server import serving
 from layouts.viewer.text import as_html, node, printable
@@ -22,7 +21,6 @@ from tests.layouts.guests import (
     ask,
     site,
     small_cell,
-    talk,
 )
 from tests.layouts.hostile_names import HOSTILE_NAMES
 from tests.pages import wait_until
@@ -37,9 +35,23 @@ def open_site(tmp_path_factory):
 
 
 @pytest.mark.parametrize("kind", ["page", "websocket"])
-@pytest.mark.parametrize("token", ["absent", "wrong", "right"])
-@pytest.mark.parametrize("origin", ["absent", "null", f"http://{EVIL}", "other port", "own"])
-@pytest.mark.parametrize("host", ["absent", EVIL, f"{EVIL}:port", "other port", "localhost", "own"])
+@pytest.mark.parametrize(
+    ("host", "origin", "token"),
+    [
+        ("own", "absent", "right"),
+        ("own", "own", "right"),
+        ("localhost", "own", "right"),
+        ("own", "own", "absent"),
+        ("own", "own", "wrong"),
+        ("own", "null", "right"),
+        ("own", f"http://{EVIL}", "right"),
+        ("localhost", "other port", "right"),
+        ("absent", "own", "right"),
+        (EVIL, "own", "right"),
+        (f"{EVIL}:port", f"http://{EVIL}", "right"),
+        ("other port", "own", "right"),
+    ],
+)
 def test_only_the_page_itself_with_its_token_is_served(open_site, host, origin, token, kind):
     port, own = open_site.port, {"localhost": "localhost"}.get(host, "127.0.0.1")
     hosts = {"own": f"{own}:{port}", "localhost": f"{own}:{port}", "absent": None}
@@ -94,17 +106,6 @@ def test_the_printed_address_opens_wherever_the_server_listens(host, tmp_path):
             guest.wait_for("ReplayDoneMessage")
         named = urlsplit(running.address).netloc.rpartition(":")[0]
         assert named == ("[::1]" if ":" in host else "localhost")
-
-
-@pytest.mark.parametrize(
-    "path",
-    ["/index.html", "/../../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "//", "/..%5c..%5cx", "*"],
-)
-def test_there_is_one_page_and_no_file(open_site, path):
-    host = {"Host": f"127.0.0.1:{open_site.port}"}
-    status, answer = ask(open_site.port, host, f"{path}?token={open_site.token}")
-    assert status == 404
-    assert b"root:" not in answer
 
 
 def test_headers_given_twice_are_refused(open_site):
@@ -175,51 +176,6 @@ def test_nothing_but_what_the_controls_send_reaches_viser(open_site, monkeypatch
     assert all(update == {"value": 0.0} for update in updates)
     assert not shared
     assert (open_site.page._qpos["arm"] == before).all()
-
-
-def test_a_message_too_large_ends_the_one_that_sent_it(open_site):
-    with Guest(open_site.address) as means_harm, Guest(open_site.address) as other:
-        box = other.wait_for("GuiCheckboxMessage", label="Frames")["uuid"]
-        means_harm.send(b"\x00" * (1 << 20))
-        with pytest.raises(ConnectionClosedError, match="1009"):
-            means_harm.wait_for("never")
-        other.enter()
-        other.set(box, False)
-        with Guest(open_site.address) as third:
-            third.wait_for("ReplayDoneMessage")
-        other.set(box, True)
-
-
-def test_requests_that_are_none_disturb_nobody(open_site, capfd):
-    for sent in (b"\0" * 4000, b"GET\r\n\r\n", b"POST / HTTP/1.1\r\n\r\n", b"G" * 100_000, b"\r\n"):
-        status, answer = talk(open_site.port, sent, ends=True)
-        assert status != 200
-        assert len(answer) < 600
-    status, _ = ask(open_site.port, {"Host": f"127.0.0.1:{open_site.port}"})
-    assert status == 403
-    assert "Traceback" not in "".join(capfd.readouterr())
-
-
-def can_enter(running):
-    try:
-        with Guest(running.address):
-            return True
-    except InvalidStatus:
-        return False
-
-
-def test_there_is_room_for_many_tabs_but_not_for_any_number(open_site):
-    guests = []
-    try:
-        while len(guests) < MOST_CLIENTS:
-            guests.append(Guest(open_site.address))
-        with pytest.raises(InvalidStatus, match="503"):
-            Guest(open_site.address)
-        guests.pop().socket.close()
-        wait_until(lambda: can_enter(open_site))
-    finally:
-        for guest in guests:
-            guest.socket.close()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 
@@ -51,26 +50,6 @@ class TestPlan:
             (source, *way) for source in ("random", "over-range") for way in ways
         ]
         assert {run.steps for run in own} == {10}
-
-    def test_asking_for_less(self):
-        runs = Wanted(all=True, history=("fresh",), reward_mode=("sparse",)).runs()
-        assert {(run.history, run.reward_mode) for run in runs} == {("fresh", "sparse")}
-        (one,) = Wanted(task=(TASK,)).runs()
-        assert (one.source, one.history) == ("random", "fresh")
-
-    def test_a_file_says_in_which_control_mode_it_was_recorded(self, tmp_path):
-        path = demonstration(tmp_path, control_mode="pd_joint_pos")
-        (found,) = Wanted(task=("PickCube-v1",), actions=path).runs()
-        assert found.control_mode == "pd_joint_pos"
-
-    def test_random_positions_lie_within_the_limits_and_partly_beyond(self):
-        layout = tasks.get_task_class("PickCube-v1").layout.in_control_mode("pd_joint_pos")
-        low, high = np.array(layout.action_bounds).T
-        (found,) = Wanted(task=("PickCube-v1",), control_mode="pd_joint_pos").runs()
-        for episode in found.episodes:
-            beyond = np.any((episode.actions < low) | (episode.actions > high), axis=1)
-            assert beyond[40:60].any()
-            assert not np.delete(beyond, slice(40, 60)).any()
 
     def test_demonstrations_are_played_beside_random_actions(self, tmp_path):
         demonstration(tmp_path / "PickCube-v1" / "planned", "trajectory.none.pd_joint_delta_pos")

@@ -140,16 +140,3 @@ def test_a_difference_has_no_sign_and_stays_visible():
     delta = np.array([[[0, 1, 40]]], np.uint8)
     assert amplified(delta, 8).tolist() == [[[0, 8, 255]]]
     assert amplified(delta, 0.1).tolist() == [[[0, 1, 4]]]
-
-
-@pytest.mark.parametrize(
-    ("words", "complaint"),
-    [
-        (["--size", "200"], "--size is 200; it must be a multiple of 16 from 192 to 1024"),
-        (["--gain", "0"], "--gain is 0; it must be above 0, at most 255"),
-        (["--demo", "no.h5"], "no.h5"),
-    ],
-)
-def test_bad_usage(words, complaint, capsys):
-    assert main(["render", "--task", "PickCube-v1", *words]) == 2
-    assert complaint in capsys.readouterr().err

@@ -1,20 +1,14 @@
 """Replay, rollout, sweep and report: what they write, what they print, and what they refuse."""
 
-import json
-import re
-from html.parser import HTMLParser
-
 import numpy as np
 import pytest
 
-import tasks
 from parity.__main__ import main
 from parity.lockstep import EpisodeResult, FirstDifference
 from parity.native import make_native, native_action
 from parity.replay import episode_table, verdict
-from parity.report import make_page
 from parity.rollout import NATIVE_FILE, OUR_FILE, VIDEO_FILE, differences_table, load
-from parity.sweep import agreement, blank, line, read_summary, write_summary
+from parity.sweep import agreement, read_summary
 from tests.native import NATIVE
 from tests.parity.test_episodes import demonstration
 
@@ -100,49 +94,6 @@ def test_what_is_said_of_episodes():
     assert [str(cell) for cell in largest] == ["1.0e+00", "0"]
 
 
-class Page(HTMLParser):
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.loads: list[str] = []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.loads += [v for k, v in attrs if k in ("src", "href") and tag != "a"]
-
-
-def test_the_report_says_what_a_summary_says(tmp_path):
-    clip = {
-        "seed": 7,
-        "source": "the <expert>",
-        "steps": 60,
-        "native_success": True,
-        "our_success": True,
-        "max_state_difference": 0.0,
-        "frames": 50,
-        "differing_frames": 0,
-        "mean_pixel_difference": 0.0,
-        "clip": "side_by_side.mp4",
-    }
-    good = blank(TASK) | {"equal": True, "source": "expert", "agreement": agreement([EQUAL])}
-    good |= {"clip": clip, "rollout": {"max_difference": 0.0}}
-    bad = blank("PushT-v1") | {"error": "it died", "agreement": agreement([EQUAL, DIFFERS])}
-    (tmp_path / TASK).mkdir()
-    (tmp_path / TASK / "side_by_side.mp4").write_bytes(b"a clip")
-    write_summary(tmp_path / "summary.json", {TASK: good, "PushT-v1": bad})
-    text = make_page(tmp_path)
-    assert all(load.startswith("data:") for load in Page(text).loads), "it needs nothing else"
-    assert "the &lt;expert&gt;" in text
-    words = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text))
-    assert "replayed episodes equal, in this sweep 2 of 3 clips in which" in words
-    assert f"1 of {len(tasks.list_clones())}" in words
-    assert f"{TASK} equal, both succeed" in words
-    assert "PushT-v1 failed" in words
-    assert "Seed 3 differs from step 4 in qpos of panda." in words
-    assert "The sweep of this task failed: it died" in words
-    assert "PickCube-v1 not swept" in words
-    assert "FAILED: it died" in line(bad)
-
-
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
@@ -160,10 +111,3 @@ def test_the_report_says_what_a_summary_says(tmp_path):
 def test_bad_usage(words, complaint, capsys):
     assert main(words) == 2
     assert complaint in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("text", ["", "[]", json.dumps({"tasks": {TASK: {"task": TASK}}})])
-def test_what_is_no_summary(tmp_path, text, capsys):
-    (tmp_path / "summary.json").write_text(text)
-    assert main(["report", "--runs", str(tmp_path)]) == 2
-    assert "is no summary of a sweep" in capsys.readouterr().err

@@ -214,11 +214,6 @@ def stall(reached: threading.Event) -> Fault:
     return fault
 
 
-def without_length(handler: _Handler, body: bytes) -> None:
-    """Send the file, and only by closing the connection tell where it ends."""
-    handler.send_without_length([body], _file_headers(body))
-
-
 def compressed(handler: _Handler, body: bytes) -> None:
     """Send the file compressed, as proxies do."""
     headers = {**_file_headers(body), "Content-Encoding": "gzip"}

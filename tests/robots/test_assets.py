@@ -17,10 +17,9 @@ from robots.assets.manifest import load_manifest
 from robots.assets.packages import INDEX_PACKAGES, MANI_SKILL, SourceError
 from robots.assets.sources import InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState
-from robots.fetch_assets import main
 from robots.urdf.summary import read_references
 from tests.catalogue import every_robot
-from tests.robots.conftest import PANDA, REAL_ROOT, contents
+from tests.robots.conftest import REAL_ROOT, contents
 
 pytestmark = pytest.mark.usefixtures("store")
 
@@ -72,12 +71,6 @@ def test_locate_tries_the_hub_then_the_installed_package(capfd):
     said = capfd.readouterr().err
     assert said.index("Hugging Face Hub") < said.index("installed mani_skill: 11 of 11 files")
     assert "licence CC BY-NC 4.0" in said
-
-
-def test_locate_says_nothing_once_the_files_are_there(store, physics, fill, capfd):
-    fill(store, physics)
-    assert UrdfLocator("maniskill_panda", "panda_v2.urdf").locate().is_file()
-    assert capfd.readouterr().err == ""
 
 
 def test_locate_names_the_closest_package_and_urdf():
@@ -213,14 +206,6 @@ def test_a_read_only_destination_is_named(read_only_folder, physics):
         ensure(physics, AssetStore(read_only_folder / "x"), [InstalledPackage(MANI_SKILL)])
 
 
-def test_a_file_in_place_of_the_destination_is_named(tmp_path, physics):
-    (tmp_path / "file").touch()
-    store = AssetStore(tmp_path / "file")
-    assert store.unusable(physics) == list(physics)
-    with pytest.raises(AssetError, match="cannot write robot files to .*choose another folder"):
-        ensure(physics, store, [InstalledPackage(MANI_SKILL)])
-
-
 def test_a_complete_read_only_copy_is_enough(store, physics, fill, monkeypatch):
     fill(store, physics)
 
@@ -257,30 +242,6 @@ def test_a_damaged_record_is_written_anew_and_loses_nothing(store, physics, fill
     assert list(json.loads(record.read_text())) == [str(physics[0])]
 
 
-def test_what_stands_in_place_of_a_file_is_exchanged_and_never_waited_for(store, physics, fill):
-    fill(store, physics)
-    fifo, link, device, sparse = (store.path(file) for file in physics[:4])
-    for path in (fifo, link, device):
-        path.unlink()
-    os.mkfifo(fifo)
-    link.symlink_to(link)
-    device.symlink_to("/dev/zero")
-    os.truncate(sparse, 10**13)
-    assert store.unusable(physics) == list(physics[:4])
-    ensure(physics, store, [FakeSource(right(physics))])
-    assert store.unusable(physics) == []
-    assert all(path.is_file() and not path.is_symlink() for path in (fifo, link, device, sparse))
-
-
-def test_a_home_of_nobody_is_named(monkeypatch, capsys):
-    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "~nobody_here/files")
-    with pytest.raises(AssetError, match="ROBOT_LAYOUTS_ASSETS is .*'~nobody_here' has no home"):
-        default_root()
-    monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "/tmp")
-    assert main(["panda", "--dest", "~nobody_here"]) == 1
-    assert "--dest is '~nobody_here'" in capsys.readouterr().err
-
-
 def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
     monkeypatch.setenv("ROBOT_LAYOUTS_ASSETS", "~/robot_files")
     monkeypatch.setenv("HOME", str(tmp_path))
@@ -290,10 +251,3 @@ def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):
     monkeypatch.setattr(paths, "CHECKOUT_CACHE", tmp_path / "no_checkout")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert default_root() == tmp_path / "cache" / "robot-layouts"
-
-
-def test_pictures_are_a_superset_of_physics():
-    for urdf in PANDA.urdfs:
-        physics = set(PANDA.needed(urdf, pictures=False))
-        pictures = set(PANDA.needed(urdf, pictures=True))
-        assert physics == pictures if urdf in PANDA.undrawable else physics < pictures

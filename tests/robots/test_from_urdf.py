@@ -202,6 +202,7 @@ class TestModule:
         known = RobotRegistry.load(robot)
         assert run(write_module(known), robot) == known
 
+    @pytest.mark.long
     def test_the_modules_are_formatted(self, tmp_path):
         for robot in ROBOTS:
             (tmp_path / f"{robot}.py").write_text(guess(robot).module(), encoding="utf-8")
@@ -265,6 +266,7 @@ class TestRobotDescriptions:
         with pytest.raises(AssetError, match="robot_descriptions could not bring ur5e_descr"):
             guess_descriptor("ur5e_description")
 
+    @pytest.mark.long
     def test_a_robot_in_its_cache_is_guessed(self, tmp_path, monkeypatch):
         """A repository of one real URDF, where the package would have cloned the public one."""
         pytest.importorskip("robot_descriptions")

@@ -21,14 +21,11 @@ from tests.robots.hub_server import (
     COMMIT,
     Fault,
     HubServer,
-    compressed,
     corrupt,
     die,
     login_page,
     stall,
     status,
-    truncate,
-    without_length,
 )
 
 pytestmark = pytest.mark.usefixtures("store", "hub_client")
@@ -107,15 +104,6 @@ def test_a_missing_mesh_is_named_and_the_others_are_kept(hub: HubServer, store, 
     assert [file.path for file in store.unusable(physics)] == [HAND]
 
 
-@pytest.mark.parametrize("fault", [truncate, without_length, compressed])
-def test_a_body_that_breaks_off_or_does_not_say_its_length_arrives(
-    hub: HubServer, store, physics, fault
-):
-    hub.fail("GET", HAND, fault, times=1)
-    fetch_from_hub(store, physics)
-    assert_all_verified(store, physics)
-
-
 def test_a_server_dying_midway_leaves_the_rest_to_the_next_source(
     hub: HubServer, store, physics, capfd
 ):
@@ -125,25 +113,6 @@ def test_a_server_dying_midway_leaves_the_rest_to_the_next_source(
     said = capfd.readouterr().err
     assert "Hugging Face Hub" in said
     assert "installed mani_skill" in said
-
-
-def test_corrupt_bytes_of_the_right_size_are_fetched_again(hub: HubServer, store, physics):
-    hub.fail("GET", HAND, corrupt, times=1)
-    fetch_from_hub(store, physics)
-    assert_all_verified(store, physics)
-    assert sum(HAND in path for path in hub.downloads()) == 2
-
-
-def test_a_corrupt_file_in_the_hubs_cache_is_replaced(hub: HubServer, store, physics, tmp_path):
-    fetch_from_hub(store, physics)
-    snapshot = next((tmp_path / "hf_home").rglob(f"snapshots/*/robots/*/{HAND}"))
-    right = snapshot.read_bytes()
-    snapshot.resolve().write_bytes(bytes(len(right)))
-    file = next(file for file in physics if file.path == HAND)
-    store.path(file).unlink()
-    fetch_from_hub(store, physics)
-    assert_all_verified(store, physics)
-    assert snapshot.read_bytes() == right
 
 
 def test_a_file_wrong_twice_is_refused_by_name(hub: HubServer, store, physics, capfd):

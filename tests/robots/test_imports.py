@@ -18,6 +18,11 @@ HEAVY = (
     "trimesh",
     "rich",
     "numpy",
+    "matplotlib",
+    "yaml",
+    "fcl",
+    "scipy",
+    "viser",
 )
 
 AUDIT = """
@@ -48,7 +53,7 @@ def run(code: str, **variables: str) -> list[str]:
 
 def test_importing_robots_and_layouts_loads_nothing_heavy_and_opens_no_socket():
     code = f"""
-import robots, layouts, robot_layouts
+import robots, layouts, layouts.__main__, robot_layouts
 from robot_layouts import kinematics
 print(*[name for name in {HEAVY!r} if name in sys.modules])
 print(*[event for event, path in seen if event.startswith("socket.")])

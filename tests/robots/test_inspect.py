@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -66,14 +64,6 @@ def test_without_any_copy_the_report_says_what_is_missing(store, monkeypatch):
 def test_inspecting_fetches_nothing(store):
     assert main(["panda"]) == 0
     assert not store.root.exists()
-
-
-def test_the_module_is_the_command():
-    command = [sys.executable, "-m", "robots.inspect", "panda_stick"]
-    settings = {"cwd": Path(__file__).parents[2], "capture_output": True, "text": True}
-    done = subprocess.run(command, check=True, **settings)
-    assert done.stdout.startswith("panda_stick: 7 joints, 7 action numbers")
-    assert done.stderr == ""
 
 
 def test_list_has_a_row_for_every_robot(capsys):

@@ -12,6 +12,7 @@ from robot_layouts.core import portable
 from robot_layouts.core.portable import is_portable, missing_variables, portable_variables
 from robots import SimulationError
 from robots.portable import main, numpy_versions
+from tests.quick import quick_cases
 
 BEGIN = (sys.executable, "-m", "robots.portable")
 OURS = (*portable.FIXED, portable.NUMPY, portable.GLIBC, portable.PORTABLE)
@@ -63,13 +64,17 @@ def test_libraries_take_the_versions_that_run_everywhere():
     assert python(code, *BEGIN) == "DEFAULT False"
 
 
+@pytest.mark.long
 def test_the_c_library_takes_them_too():
     code = "from math import cos; print([cos(i / 7).hex() for i in range(20000)])"
     without = python(code, GLIBC_TUNABLES="glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4")
     assert python(code, *BEGIN) == without
 
 
-@pytest.mark.parametrize("name", [name for name in OURS if name != portable.PORTABLE])
+@pytest.mark.parametrize(
+    "name",
+    quick_cases([name for name in OURS if name != portable.PORTABLE], ["ATEN_CPU_CAPABILITY"]),
+)
 def test_a_variable_that_is_missing_is_named(name):
     variables = portable_variables({}, numpy_versions())
     assert not missing_variables(variables)
@@ -80,6 +85,7 @@ def test_a_variable_that_is_missing_is_named(name):
     assert f": {name}; begin with `robot-layouts portable python" in complaint
 
 
+@pytest.mark.long
 def test_variables_that_are_set_too_late_do_not_count():
     late = f"import os; os.environ.update({portable_variables({}, numpy_versions())}); "
     assert "set, but not what belongs to it before Python begins" in python(late + SAYS)
@@ -118,5 +124,6 @@ def test_a_program_that_is_none(capsys, tmp_path):
     assert "cannot be begun: " in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_the_exit_code_is_the_programs():
     assert run(*BEGIN, sys.executable, "-c", "raise SystemExit(7)").returncode == 7

@@ -12,6 +12,7 @@ import pytest
 
 from robots import DescriptorError, RobotRegistry, UnknownNameError, closest_match
 from robots.registry import CATALOGUE, ROBOTS
+from tests.quick import quick_cases
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -101,6 +102,7 @@ def test_another_package_brings_a_robot(other_package):
     assert run_with(other_package, code) == f"acme {' '.join(names)}\n"
 
 
+@pytest.mark.long
 def test_another_packages_nonsense_is_named(other_package):
     code = (
         "try: RobotRegistry.load('acme_nonsense')\n"
@@ -122,14 +124,17 @@ def add_to(other_package: Path, entry_point: str, module: str = "") -> None:
 
 @pytest.mark.parametrize(
     ("entry_point", "module", "reason"),
-    [
-        ("bad = broken:ARM", "raise RuntimeError('no GPU')", "RuntimeError: no GPU"),
-        ("bad = broken:ARM", "raise SystemExit(3)", "SystemExit: 3"),
-        ("bad = broken:ARM", "", "AttributeError: module 'broken' has no attribute 'ARM'"),
-        ("bad = missing:ARM", "", "ModuleNotFoundError: No module named 'missing'"),
-        ("bad = acme:ARM", "", "is listed as 'bad', but its robot is 'acme_arm'"),
-        ("bad = acme:ARM\nbad = broken:ARM", "", "'bad' is brought more than once, by entry"),
-    ],
+    quick_cases(
+        [
+            ("bad = broken:ARM", "raise RuntimeError('no GPU')", "RuntimeError: no GPU"),
+            ("bad = broken:ARM", "raise SystemExit(3)", "SystemExit: 3"),
+            ("bad = broken:ARM", "", "AttributeError: module 'broken' has no attribute 'ARM'"),
+            ("bad = missing:ARM", "", "ModuleNotFoundError: No module named 'missing'"),
+            ("bad = acme:ARM", "", "is listed as 'bad', but its robot is 'acme_arm'"),
+            ("bad = acme:ARM\nbad = broken:ARM", "", "'bad' is brought more than once, by entry"),
+        ],
+        [("bad = broken:ARM", "raise RuntimeError('no GPU')", "RuntimeError: no GPU")],
+    ),
 )
 def test_a_robot_that_cannot_be_loaded_is_named_and_leaves_the_others_alone(
     other_package, entry_point, module, reason
@@ -150,6 +155,7 @@ def test_a_robot_that_cannot_be_loaded_is_named_and_leaves_the_others_alone(
     assert counts == f"{len(CATALOGUE) + 1} 2"  # acme_nonsense, too
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["robots list", "robots fetch --check"])
 def test_commands_for_all_robots_name_those_that_cannot_be_loaded(other_package, command):
     done = subprocess.run(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robots import AssetError, RobotRegistry
+from robots import RobotRegistry
 from robots.assets.fetching import ensure
 from robots.assets.manifest import load_manifest
 from robots.assets.packages import MANI_SKILL
@@ -109,18 +109,6 @@ RobotRegistry.load(sys.argv[1]).urdf.locate(pictures=sys.argv[2] == "True")
     assert [process.returncode for process in started] == [0, 0, 0], said
     assert index.downloads == 1
     assert sum("downloading the wheel" in words for words in said) == 1
-
-
-@pytest.mark.long
-def test_a_member_that_unpacks_to_more_than_it_may_is_not_unpacked(index, store, physics):
-    bomb = physics[0]
-    packed = members(physics, contents)
-    packed[f"{bomb.origin.folder}/{bomb.path}"] = bytes(3 * 10**7)
-    index.wheel = build_wheel(packed)
-    expected = rf"twice: {bomb} \(more than {bomb.bytes:,} bytes\)"
-    with pytest.raises(AssetError, match=expected):
-        ensure(physics, store, [PackageWheel(MANI_SKILL)])
-    assert store.unusable(physics) == [bomb]
 
 
 @pytest.mark.long

@@ -143,6 +143,7 @@ def test_the_command_takes_arguments(template, capsys):
     assert "arm: left_shoulder, left_elbow" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_without_the_package_the_message_says_what_to_install(template):
     code = """
 import sys

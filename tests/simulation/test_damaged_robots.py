@@ -20,20 +20,15 @@ def simulate(urdf, **better) -> Simulation:
 
 
 @pytest.mark.parametrize("kind", TEXTS)
-def test_it_steps(kind, tmp_path):
+def test_it_is_checked_and_steps(kind, tmp_path):
     simulation = simulate(write_damaged(tmp_path, TEXTS[kind]))
+    assert simulation.layout.validate(samples=1, workspaces=False).ok
     simulation.clear([0])
     simulation.worlds[0].stand("arm", simulation.layout["arm"].start_qpos)
     action = np.ones((1, simulation.layout["arm"].robot.action_dim), np.float32)
     for _ in range(5):
         simulation.step(action, simulation.read().joint_positions)
     assert np.isfinite(simulation.read().joint_positions).all()
-
-
-@pytest.mark.parametrize("kind", TEXTS)
-def test_it_is_checked(kind, tmp_path):
-    robot = RobotDescriptor.from_urdf(write_damaged(tmp_path, TEXTS[kind]), quiet=True)
-    assert single({"arm": robot}).validate(samples=1, workspaces=False).ok
 
 
 def test_mass_and_inertia_are_those_that_were_told(tmp_path):

@@ -63,7 +63,7 @@ def limits(robot: str, joints: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]
 
 # Fetch's torso is at its end, and the arm with a hand is xarm7's.
 @pytest.mark.parametrize("robot", [n for n in ROBOTS if n not in ("fetch", "xarm7_ability")])
-@pytest.mark.parametrize("seed", range(10))  # of a hundred, one finds no solution for xarm7
+@pytest.mark.parametrize("seed", range(3))  # of a hundred, one finds no solution for xarm7
 def test_a_solution_reaches_the_request_within_the_limits(robot, seed):
     kinematics, start = InverseKinematics(world_of(robot), "arm"), rest(robot)
     low, high = limits(robot, kinematics.joints)

@@ -14,17 +14,17 @@ from robots import SimulationError
 
 
 @pytest.mark.parametrize("field", [field.name for field in dataclasses.fields(PhysicsSettings)])
-@pytest.mark.parametrize("value", [None, "1", math.nan, -7, 1e9, ()])
-def test_no_field_takes_nonsense(field, value):
-    with pytest.raises(SimulationError, match=field):
-        PhysicsSettings(**{field: value})
+def test_no_field_takes_nonsense(field):
+    for value in (None, "1", math.nan, -7, 1e9, ()):
+        with pytest.raises(SimulationError, match=field):
+            PhysicsSettings(**{field: value})
 
 
 @pytest.mark.parametrize("field", ["static", "dynamic", "restitution"])
-@pytest.mark.parametrize("value", [None, "0.3", math.inf, -0.1, 1e9, True])
-def test_no_coefficient_takes_nonsense(field, value):
-    with pytest.raises(SimulationError, match=f"friction: {field} is "):
-        Friction(**{field: value})
+def test_no_coefficient_takes_nonsense(field):
+    for value in (None, "0.3", math.inf, -0.1, 1e9, True):
+        with pytest.raises(SimulationError, match=f"friction: {field} is "):
+            Friction(**{field: value})
 
 
 def test_contacts_are_generated_before_bodies_rest():

@@ -29,22 +29,9 @@ MISTAKES = (
         ),
     ),
     Mistake(
-        "a misspelt attribute",
-        dict(max_episode_steps=None, max_episode_step=100),
-        (
-            "Tray sets no max_episode_steps: after how many control steps an episode is "
-            "truncated, such as max_episode_steps = 100. Is 'max_episode_step' meant to be it?"
-        ),
-    ),
-    Mistake(
         "episodes of no step",
         dict(max_episode_steps=0),
         "Tray.max_episode_steps is 0; it must be an integer from 1 to 2147483647",
-    ),
-    Mistake(
-        "a fractional number of steps",
-        dict(max_episode_steps=50.0),
-        "Tray.max_episode_steps is 50.0; it must be an integer from 1 to 2147483647",
     ),
     Mistake(
         "no evaluate",
@@ -66,11 +53,6 @@ MISTAKES = (
         "a misspelt dense_reward",
         dict(dense_reward=None, dense_rewards=Tray.dense_reward),
         ("Tray defines 'dense_rewards', which nothing calls. Did you mean 'dense_reward'?"),
-    ),
-    Mistake(
-        "a misspelt observe",
-        dict(observe=None, observes=Tray.observe),
-        "Tray defines 'observes', which nothing calls. Did you mean 'observe'?",
     ),
     Mistake(
         "evaluate without a state",

@@ -21,14 +21,6 @@ MISTAKES = (
         "Tray.evaluate() returned None; it must return a dict of arrays by name",
     ),
     Mistake(
-        "success alone",
-        evaluating(success),
-        (
-            "Tray.evaluate() returned an array, bool of shape (2,); it must return a dict of "
-            "arrays by name"
-        ),
-    ),
-    Mistake(
         "success by another name",
         evaluating(lambda state: {"solved": success(state)}),
         (
@@ -63,14 +55,6 @@ MISTAKES = (
         (
             "Tray.evaluate() returned 'success' as bool of shape (2, 1); it must have shape "
             "(2,); [..., 0] leaves the last axis out"
-        ),
-    ),
-    Mistake(
-        "success of all together",
-        evaluating(lambda state: {"success": success(state).any()}),
-        (
-            "Tray.evaluate() returned 'success' as the single bool False; it must have shape "
-            "(2,), one for each environment: x[:, 2], not x[0, 2]; x.any(1), not x.any()"
         ),
     ),
     Mistake(
@@ -214,27 +198,6 @@ MISTAKES = (
         steps=3,
     ),
     Mistake(
-        "an observation that shrinks",
-        observing(
-            in_turn(
-                lambda state: {"a": state.pose("cube")}, lambda state: {"a": state.position("cube")}
-            )
-        ),
-        (
-            "Tray.observe() returned 'a' as float32 of shape (2, 3); at first it was float32 of "
-            "shape (2, 7), and must stay that"
-        ),
-        steps=3,
-    ),
-    Mistake(
-        "a state changed by observe",
-        observing(lambda state: {"h": in_place(state)}),
-        (
-            "Tray.observe() changed the poses of the state, which share its memory; change a "
-            "copy: tasks.maths.copy(x)"
-        ),
-    ),
-    Mistake(
         "an observation of NaN",
         observing(lambda state: {"h": state.pose("cube") * math.nan}),
         "Tray.observe(): 'h' is nan in environment 0 at step 0; it must be finite",
@@ -310,15 +273,6 @@ MISTAKES = (
         ),
         ("Tray.dense_reward() returned float64; at first it was float32, and must stay that"),
         steps=2,
-    ),
-    Mistake(
-        "a state changed by a reward",
-        rewarding(in_place),
-        (
-            "Tray.dense_reward() changed the poses of the state, which share its memory; change "
-            "a copy: tasks.maths.copy(x)"
-        ),
-        steps=1,
     ),
     Mistake(
         "a reward as a row",

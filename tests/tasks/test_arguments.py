@@ -161,11 +161,6 @@ def test_all_of_the_vocabulary_is_public():
         tasks.Cubiod  # noqa: B018
 
 
-def test_listing_names_loads_no_torch():
-    code = "import sys, tasks; dir(tasks); sys.exit('torch' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
 @pytest.mark.long
 def test_a_list_of_tasks_needs_no_robot_files(tmp_path):
     """Neither here nor from anywhere: the folder for them stays empty."""

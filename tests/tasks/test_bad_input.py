@@ -6,11 +6,12 @@ import torch
 
 import tasks
 from robots import ActionError, TaskError, UnknownNameError
+from tests.quick import quick_cases
 
 TASKS = tasks.list_tasks()
 
 
-@pytest.mark.parametrize("task_id", TASKS)
+@pytest.mark.parametrize("task_id", quick_cases(TASKS))
 def test_robots_that_cannot_be(task_id: str):
     place = next(iter(tasks.get_task_class(task_id).layout))
     with pytest.raises(UnknownNameError, match="unknown robot 'pandda'. Did you mean 'panda'"):
@@ -21,7 +22,7 @@ def test_robots_that_cannot_be(task_id: str):
         tasks.make(task_id, reward_mode="densest")
 
 
-@pytest.mark.parametrize("task_id", TASKS)
+@pytest.mark.parametrize("task_id", quick_cases(TASKS))
 def test_bad_calls_change_nothing(task_id: str):
     env = tasks.make(task_id, num_envs=2)
     env.reset(seed=0)

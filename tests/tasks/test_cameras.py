@@ -35,6 +35,7 @@ def seen(obs, camera: str = "base_camera", texture: str = "rgb") -> torch.Tensor
     return obs["sensor_data"][camera][texture]
 
 
+@pytest.mark.long
 def test_states_need_nothing_that_draws():
     code = (
         "import sys, tasks\n"

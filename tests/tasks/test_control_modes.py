@@ -46,18 +46,11 @@ def expect_native(task_id, history, episodes):
 class TestNative:
     pytestmark = NATIVE
 
-    @pytest.mark.parametrize("history", quick_cases(HISTORIES, ["reused"]))
-    @pytest.mark.parametrize("task_id", quick_cases(SOME_TASKS))
-    def test_random_and_over_range_positions(self, task_id, history):
-        expect_native(task_id, history, over_range_episodes(task_id, 40))
-
-    @pytest.mark.parametrize("task_id", quick_cases(SOME_TASKS))
-    def test_scripted_contact(self, task_id):
-        contacts = expect_native(task_id, "reused", [touching(task_id, seed) for seed in SEEDS])
+    @pytest.mark.parametrize("task_id", quick_cases(SOME_TASKS, ["TwoRobotPickCube-v1"]))
+    def test_random_positions_and_scripted_contact(self, task_id):
+        episodes = [*over_range_episodes(task_id, 40), *(touching(task_id, s) for s in SEEDS)]
+        contacts = expect_native(task_id, "reused", episodes)
         assert contacts >= 10, "hardly anything was touched"
-
-    @pytest.mark.parametrize("task_id", SOME_TASKS)
-    def test_the_action_space_is_natives(self, task_id):
         native, ours = both_sides(task_id)
         theirs = native.envs[0].single_action_space
         spaces = list(theirs.values()) if hasattr(theirs, "values") else [theirs]

@@ -95,6 +95,7 @@ def run(folder: Path, *words: str) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_a_module_and_an_id_go_wherever_an_id_goes(mylab):
     code = (
         "import tasks, sys\n"

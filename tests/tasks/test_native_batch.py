@@ -8,12 +8,12 @@ from parity.lockstep import HISTORIES, differing, select
 from tasks.episode import Episode
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, Pair, complaints, pair
+from tests.quick import quick_cases
 
 pytestmark = NATIVE
 
 NUM_ENVS = 8
-QUICK = ("PushT-v1",)  # batching is the same in every task
-BATCHED = [t if t in QUICK else pytest.param(t, marks=pytest.mark.long) for t in TASKS]
+BATCHED = quick_cases(TASKS, ["PushT-v1"])  # batching is the same in every task
 
 
 def step_and_compare(both: Pair, rng: np.random.Generator, steps: int) -> None:
@@ -23,16 +23,9 @@ def step_and_compare(both: Pair, rng: np.random.Generator, steps: int) -> None:
         assert differing(native, ours) == []
 
 
-# Batching is the same in every task, and costs most where worlds are rebuilt.
-PLAYED = {("PushT-v1", "reused")}
-EPISODES = [
-    pytest.param(t, h, marks=() if (t, h) in PLAYED else pytest.mark.long)
-    for t in TASKS
-    for h in HISTORIES
-]
-
-
-@pytest.mark.parametrize(("task_id", "history"), EPISODES)
+@pytest.mark.long
+@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize("task_id", TASKS)
 def test_random_and_scripted_episodes_side_by_side(task_id, history):
     both = pair(task_id, num_envs=NUM_ENVS)
     scripted = [Episode(i, touching_episode(task_id, i).actions[:60]) for i in (0, 1)]
@@ -42,7 +35,8 @@ def test_random_and_scripted_episodes_side_by_side(task_id, history):
     assert complaints(results) == []
 
 
-@pytest.mark.parametrize("task_id", BATCHED)
+@pytest.mark.long
+@pytest.mark.parametrize("task_id", TASKS)
 def test_one_seed_counts_up(task_id):
     both = pair(task_id, num_envs=NUM_ENVS)
     both.forget()

@@ -1,25 +1,18 @@
 """Episodes of every task are native's to the last bit: random actions, and scripted contact."""
 
+from contextlib import nullcontext
+
 import pytest
 
 import tasks
 from parity.episodes import random_episodes
-from parity.lockstep import HISTORIES
+from parity.lockstep import HISTORIES, differing
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
-from tests.quick import quick_cases
 
 pytestmark = NATIVE
 
-# The second begins in a world that has a past; the others in one that is rebuilt.
-SEEDS = {"reused": (1, 2), "fresh": (1,)}
-REUSED = quick_cases(HISTORIES, ["reused"])
-
-
-def other_modes():
-    """Every task with each of its reward modes but the first, which other tests use."""
-    modes = [(t, mode) for t in TASKS for mode in tasks.get_task_class(t).reward_modes[1:]]
-    return quick_cases(modes, [(t, "dense") for t in TASKS])
+SEEDS = (*range(2, 8), 2**31 - 1, 2**32 - 1)
 
 
 def has_movable_bodies(task_id):
@@ -27,38 +20,54 @@ def has_movable_bodies(task_id):
     return any(body.kind == "dynamic" for body in world.bodies.values())
 
 
-@pytest.mark.parametrize("history", REUSED)
 @pytest.mark.parametrize("task_id", TASKS)
-def test_random_and_over_range_actions(task_id, history):
+def test_a_clone_is_native(task_id):
+    """One world of each side, and in turn all that the long tests look at in full.
+
+    Actions over their range, contact, another reward mode, small and large seeds, and a state that
+    native was in and from which both go on; each begins with the past of those before it.
+    """
     both = pair(task_id)
-    episodes = random_episodes(SEEDS[history], 60, both.ours.action_dim)
-    assert abs(episodes[0].actions).max() > 2, "no action beyond the range"
-    assert complaints(both.play(episodes, history)) == []
+    modes = tuple(both.native.envs[0].SUPPORTED_REWARD_MODES)
+    assert tasks.get_task_class(task_id).reward_modes == modes
+
+    [random] = random_episodes([1], 60, both.ours.action_dim)
+    assert abs(random.actions).max() > 2, "no action beyond the range"
+    played = [random, touching_episode(task_id, 1)]
+    results = both.play(played, "reused")
+    with both.rewarding("dense") if "dense" in modes[1:] else nullcontext():
+        results += both.play([touching_episode(task_id, 2)], "reused")
+    assert complaints(results) == []
+    if has_movable_bodies(task_id):
+        assert sum(result.contact_steps for result in results) >= 10, "hardly anything was touched"
+
+    for seed in SEEDS:
+        native, ours = (side.reset([seed], [0], rebuild=False) for side in both)
+        assert differing(native, ours) == [], f"seed {seed}"
+
+    state = both.native.envs[0].get_state_dict()
+    for action in random.actions[:10]:
+        native, ours = (side.step(action[None]) for side in both)
+        assert differing(native, ours) == []
+    both.forget()
+    both.native.envs[0].set_state_dict(state)
+    both.ours.env.set_state_dict(state)
+    for action in random.actions[10:20]:
+        native, ours = (side.step(action[None]) for side in both)
+        assert differing(native, ours) == []
 
 
-@pytest.mark.parametrize(("task_id", "mode"), other_modes())
-def test_reward_modes(task_id, mode):
+@pytest.mark.long
+@pytest.mark.parametrize("history", HISTORIES)
+@pytest.mark.parametrize(
+    ("task_id", "mode"),
+    [(t, mode) for t in TASKS for mode in tasks.get_task_class(t).reward_modes[1:]],
+)
+def test_reward_modes(task_id, mode, history):
     both = pair(task_id)
     episodes = [touching_episode(task_id, 0), *random_episodes([1], 30, both.ours.action_dim)]
     with both.rewarding(mode):
-        assert complaints(both.play(episodes, "reused")) == []
-
-
-def test_reward_modes_are_natives():
-    for task_id in TASKS:
-        modes = pair(task_id).native.envs[0].SUPPORTED_REWARD_MODES
-        assert tasks.get_task_class(task_id).reward_modes == tuple(modes)
-
-
-@pytest.mark.parametrize("history", REUSED)
-@pytest.mark.parametrize("task_id", TASKS)
-def test_scripted_contact(task_id, history):
-    episodes = [touching_episode(task_id, seed) for seed in SEEDS[history]]
-    results = pair(task_id).play(episodes, history)
-    assert complaints(results) == []
-    if has_movable_bodies(task_id):
-        touched = sum(result.contact_steps for result in results)
-        assert touched >= 5 * len(results), "hardly anything was touched"
+        assert complaints(both.play(episodes, history)) == []
 
 
 @pytest.mark.long

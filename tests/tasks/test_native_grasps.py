@@ -10,7 +10,7 @@ from parity.native import native_action, native_agents
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, Pair, pair
 
-pytestmark = NATIVE
+pytestmark = [*NATIVE, pytest.mark.long]
 
 GRASPING_TASKS = ("PickCube-v1", "TwoRobotPickCube-v1")  # their motions end with a cube in hand
 
@@ -64,7 +64,6 @@ def test_grasps_and_stale_contacts_in_a_world_with_a_past(task_id):
     assert stale, "no grasp outlived a reset, so nothing was tested"
 
 
-@pytest.mark.long  # the comparisons of scripted contact do it for one pair of seeds
 @pytest.mark.parametrize("task_id", TASKS)
 def test_reset_after_contact(task_id):
     """Everything that a reset returns is equal right after contact, evaluation included."""

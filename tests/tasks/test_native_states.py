@@ -9,7 +9,7 @@ from parity.native import native_action
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, Pair, pair
 
-pytestmark = NATIVE
+pytestmark = [*NATIVE, pytest.mark.long]
 
 
 def recorded_states(both: Pair, task_id: str) -> list[dict]:

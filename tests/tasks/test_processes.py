@@ -1,6 +1,5 @@
 """Worker processes: how they start, what forks and threads may do, what copies and ends leave."""
 
-import copy
 import gc
 import multiprocessing
 import os
@@ -8,7 +7,6 @@ import pickle
 import resource
 import signal
 import sys
-import threading
 import weakref
 from contextlib import closing, contextmanager, suppress
 from multiprocessing import util
@@ -20,12 +18,11 @@ import pytest
 
 import tasks
 from benchmarks.soak import read_level
-from robot_layouts.core.processes.start import ProcessError
 from robot_layouts.core.processes.transport import RemoteError, SentError, packed
 from robot_layouts.core.processes.worker import Status, Worker
 from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backend import worlds_below
-from robots import RobotLayoutsError, SimulationError, TaskError
+from robots import SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
 from tasks.interfaces.workers import WorkerError
 from tests.fresh_process import in_fresh_process
@@ -197,20 +194,6 @@ def descriptors(more):
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("more", [0, 3, 8])
-def test_too_few_descriptors_are_one_error_and_nothing_is_left(more):
-    asked(look_around)  # the server is there already
-    before, open_before = multiprocessing.active_children(), len(os.listdir("/proc/self/fd"))
-    with (
-        descriptors(more),
-        pytest.raises(RobotLayoutsError, match="Too many open files"),  # of workers or robot files
-    ):
-        VectorTask(TASK, 8, num_workers=8)
-    assert multiprocessing.active_children() == before
-    assert len(os.listdir("/proc/self/fd")) == open_before
-
-
 # -- errors ---------------------------------------------------------------------------------------
 
 
@@ -278,24 +261,6 @@ def test_any_error_arrives_whether_it_was_raised_or_not(error, words):
 # -- threads --------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("workers", [0, 2])
-def test_a_second_thread_is_refused_at_once_and_the_first_goes_on(workers):
-    with vector(workers, "SlowSteps-v1") as env:
-        env.step(ACTION)
-        results = []
-        thread = threading.Thread(target=lambda: results.append(env.step(ACTION)))
-        thread.start()
-        while not env.busy.locked():
-            pass
-        for call in (lambda: env.step(ACTION), env.reset, env.restart, env.close):
-            with pytest.raises(SimulationError, match="in the middle of another call; give each"):
-                call()
-        thread.join()
-        assert results[0][4]["elapsed_steps"].tolist() == [2, 2]
-        assert env.step(ACTION)[4]["elapsed_steps"].tolist() == [3, 3]
-
-
 # -- forks ----------------------------------------------------------------------------------------
 
 
@@ -331,13 +296,6 @@ def test_a_fork_neither_uses_nor_ends_the_workers_of_a_vector():
         assert env.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1]
 
 
-def test_a_task_is_the_same_in_a_fork():
-    with closing(tasks.make(TASK, num_envs=2)) as env:
-        env.reset(seed=1)
-        forked = in_fork(lambda: env.step(ACTION)[0].numpy().tobytes())
-        assert forked == env.step(ACTION)[0].numpy().tobytes()
-
-
 @pytest.mark.long
 def test_pictures_in_a_fork_are_refused_in_the_place_of_a_hang():
     if problem := vulkan_problem():
@@ -358,51 +316,3 @@ def test_pictures_in_a_fork_are_refused_in_the_place_of_a_hang():
 
 
 # -- copies ---------------------------------------------------------------------------------------
-
-
-def through_pickle(env):
-    return pickle.loads(pickle.dumps(env))
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("front", [*FRONTS, "workers"])
-@pytest.mark.parametrize(
-    "make_copy",
-    [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))],
-    ids=["copy", "pickle"],
-)
-def test_a_copy_is_made_alike_and_is_another(front, make_copy):
-    makers = {**FRONTS, "workers": lambda: VectorTask(TASK, 2, num_workers=2)}
-    with closing(makers[front]()) as env:
-        with closing(make_copy(env)) as other:
-            assert type(other) is env.task_class
-            theirs = pickle.dumps(begin(other))
-        assert pickle.dumps(begin(env)) == theirs
-
-
-def begin(env):
-    """Begin an episode of one seed and return what is observed, as lists."""
-    if hasattr(env, "env_is_wrapped"):
-        env.seed(5)
-        return env.reset().tolist()
-    obs, _ = env.reset(seed=5)
-    return {k: x.tolist() for k, x in obs.items()} if isinstance(obs, dict) else obs.tolist()
-
-
-@pytest.mark.long
-def test_a_copy_that_fails_leaves_the_vector_alone():
-    with vector(2) as env:
-        env.reset(seed=1)
-        with descriptors(2), pytest.raises(ProcessError):
-            copy.deepcopy(env)
-        assert env.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1]
-
-
-def test_a_closed_vector_can_be_pickled():
-    with vector(0) as env:
-        env.close()
-        with closing(through_pickle(env)) as other:
-            other.reset()
-    with suppress(SimulationError):
-        env.reset()
-        raise AssertionError("the closed one is open again")

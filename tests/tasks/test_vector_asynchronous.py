@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode
 
 from robots import ActionError, SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
-from tasks.interfaces.workers import WorkerError, partition
+from tasks.interfaces.workers import partition
 from tests.quick import quick_cases
 from tests.tasks.test_vector import differences, make
 from tests.tasks.test_vector_failures import interrupted
@@ -180,24 +180,6 @@ def test_a_reset_forgets_what_was_sent(shared):
     shared.send(np.ones((NUM_ENVS, 8), np.float32), EVERYONE)
     shared.reset(options={"reset_mask": EVERYONE < 3})
     assert shared.recv()[4]["env_id"].tolist() == [3, 4]
-
-
-@pytest.mark.long
-def test_a_worker_that_dies_is_told_and_the_others_can_be_received(shared):
-    shared.reset(seed=7)
-    victim = shared._backend.workers[0].pid
-    os.kill(victim, signal.SIGSTOP)  # or it may have taken its steps before it dies
-    shared.send(np.zeros((NUM_ENVS, 8), np.float32), EVERYONE)
-    os.kill(victim, signal.SIGKILL)
-    with pytest.raises(WorkerError, match=r"environments \[0, 1\] of seeds \[7, 8\]"):
-        [shared.recv() for _ in range(2)]
-    shared.restart()
-    away = sorted(shared._backend.pending.env_ids)
-    assert set(away) <= {2, 3, 4}
-    back = [i for i in range(NUM_ENVS) if i not in away]
-    shared.send(np.zeros((len(back), 8), np.float32), back)
-    came = [i for _ in range(2) for i in shared.recv()[4]["env_id"].tolist()]
-    assert len(set(came)) == 4
 
 
 @pytest.mark.long

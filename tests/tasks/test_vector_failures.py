@@ -3,10 +3,8 @@
 import multiprocessing
 import os
 import signal
-import subprocess
 import sys
-import time
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +15,8 @@ from robot_layouts.core.processes.worker import Worker
 from robots import SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
 from tasks.interfaces.workers import WorkerError
-from tests.tasks import breaking
 
-GONE, LEFT = [0, 1], [2, 3]  # environments of the first worker and of the second
 ACTION = np.full((4, 8), 0.2, np.float32)
-PATIENCE = 20.0  # s, for processes to be gone on a busy machine
 
 
 def workers():
@@ -37,50 +32,6 @@ def shared():
 
 def first_worker(env):
     return env._backend.workers[0].pid
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("how", ["killed", "hung"])
-def test_a_worker_that_fails_is_told_and_replaced(shared, how):
-    reference = VectorTask("PickCube-v1", num_envs=4, num_workers=0)
-    for env in (shared, reference):
-        env.reset(seed=40, options={"reconfigure": True})
-        env.step(ACTION)
-    victim = first_worker(shared)
-    shared._backend.timeout = 30.0 if how == "killed" else 3.0
-    os.kill(victim, signal.SIGKILL if how == "killed" else signal.SIGSTOP)
-    with pytest.raises(WorkerError) as caught:
-        shared.step(ACTION)
-    shared._backend.timeout = 30.0
-    error = caught.value
-    assert error.env_ids == GONE
-    assert error.seeds == [40, 41]
-    why = "died by SIGKILL" if how == "killed" else "did not reply within 3 s and was ended"
-    assert f"worker 0 with environments [0, 1] of seeds [40, 41]: process {victim} {why}" in str(
-        error
-    )
-    assert "restart()" in str(error)
-
-    expected = reference.step(ACTION)
-    for result, wanted in zip(error.results[:4], expected[:4], strict=True):
-        np.testing.assert_array_equal(result[LEFT], wanted[LEFT])
-    with pytest.raises(WorkerError, match=r"environments \[0, 1\]"):
-        shared.step(ACTION)
-    with pytest.raises(TaskError, match=r"environments \[3\] are not gone"):
-        shared.restart({3: 5})
-
-    obs, info = shared.restart({1: 77})
-    gone = np.array([True, True, False, False])
-    wanted, _ = reference.reset(
-        seed=[40, 77, None, None], options={"reset_mask": gone, "reconfigure": True}
-    )
-    np.testing.assert_array_equal(obs, wanted)
-    assert info["elapsed_steps"].tolist() == [0, 0, 2, 2]
-    for _ in range(50):  # beyond the end of the episodes
-        for result, wanted in zip(shared.step(ACTION)[:4], reference.step(ACTION)[:4], strict=True):
-            np.testing.assert_array_equal(result, wanted)
-    assert victim not in workers()
-    assert len(workers()) == 2
 
 
 def test_after_an_interrupted_step_the_next_one_is_right(shared):
@@ -163,14 +114,6 @@ def test_an_interrupt_as_a_call_begins_locks_nobody_out():
 
 
 @pytest.mark.long
-def test_a_worker_s_death_is_seen_although_a_process_that_it_forked_holds_its_connection():
-    with breaking.offered(), closing(VectorTask("Forks-v1", num_workers=1, timeout=20.0)) as env:
-        os.kill(first_worker(env), signal.SIGKILL)
-        with pytest.raises(WorkerError, match="died by SIGKILL"):
-            env.step(ACTION[:1])
-
-
-@pytest.mark.long
 def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
     shared.reset(seed=0)
     workers_of_it, living = shared._backend.workers, first_worker(shared)
@@ -196,6 +139,7 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
     assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1, 1, 1]
 
 
+@pytest.mark.long
 def test_an_error_in_a_worker_is_told_with_its_place(shared):
     with pytest.raises(
         WorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*workers.py"
@@ -228,91 +172,3 @@ def test_what_cannot_be_built_raises_here_and_leaves_nothing():
     with pytest.raises(TaskError, match="has the places"):
         VectorTask("PickCube-v1", num_envs=2, num_workers=1, layout=two)
     assert workers() == before
-
-
-@pytest.mark.long
-def test_a_script_without_a_guard_is_told_so(tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(
-        "import gymnasium, tasks\n"
-        "gymnasium.make_vec('RobotLayouts/PickCube-v1', num_envs=2, num_workers=1)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, str(script)],
-        env={**os.environ, "PYTHONPATH": os.getcwd()},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert (
-        "a script runs belongs under `if __name__ == '__main__':`" in done.stderr.splitlines()[-1]
-    )
-
-
-SCRIPT = """
-import multiprocessing, sys, time
-import numpy as np
-from tasks.interfaces.vector import VectorTask
-
-if __name__ == "__main__":
-    env = VectorTask("PickCube-v1", num_envs=2, num_workers=1)
-    env.reset(seed=0)
-    print(*(p.pid for p in multiprocessing.active_children()), flush=True)
-    while True:
-        env.step(np.zeros((2, 8), np.float32))
-        if sys.argv[1] == "raises":
-            raise ValueError("on purpose")
-"""
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("ending", "code"),
-    [
-        pytest.param("raises", 1, marks=pytest.mark.long),
-        pytest.param("interrupted", -signal.SIGINT, marks=pytest.mark.long),
-        ("killed", -signal.SIGKILL),
-    ],
-)
-def test_no_ending_leaves_a_process_or_memory(tmp_path, ending, code):
-    script, memory_before = tmp_path / "script.py", set(os.listdir("/dev/shm"))
-    script.write_text(SCRIPT)
-    process = subprocess.Popen(
-        [sys.executable, str(script), ending],
-        env={**os.environ, "PYTHONPATH": os.getcwd()},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    try:
-        assert process.stdout is not None
-        worker = int(process.stdout.readline())
-        if ending == "interrupted":
-            assert lives(worker)
-            os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-        elif ending == "killed":
-            assert lives(worker)
-            process.kill()
-        _, said = process.communicate(timeout=PATIENCE)
-        assert process.returncode == code, said
-        assert said.count("Traceback") <= 1, said
-        expect_gone(worker)
-        assert set(os.listdir("/dev/shm")) <= memory_before
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-
-
-def lives(pid):
-    with suppress(FileNotFoundError):
-        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
-    return False
-
-
-def expect_gone(pid):
-    deadline = time.monotonic() + PATIENCE
-    while lives(pid):
-        assert time.monotonic() < deadline, f"process {pid} is still there"
-        time.sleep(0.05)
