@@ -69,7 +69,7 @@ def single(robots: Mapping[str, RobotLike], *, keyframe: str | None = None) -> L
 
 
 def side_by_side(
-    robots: Mapping[str, RobotLike], *, spacing: Distance, keyframe: str | None = "rest"
+    robots: Mapping[str, RobotLike], *, spacing: Distance = "auto", keyframe: str | None = "rest"
 ) -> Layout:
     """Robots in a row along y through the origin, all facing +x; the first at the smallest y.
 
@@ -96,7 +96,7 @@ def side_by_side(
 
 
 def face_to_face(
-    robots: Mapping[str, RobotLike], *, spacing: Distance, keyframe: str | None = "rest"
+    robots: Mapping[str, RobotLike], *, spacing: Distance = "auto", keyframe: str | None = "rest"
 ) -> Layout:
     """Two robots on the y axis, looking at each other across the origin; the first at -y.
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from robot_layouts.core.cli import Count, Folder, Seed, Word
-from robot_layouts.core.pages import plural
 from robot_layouts.data.playing.command_options import (
     Acting,
     Players,
@@ -16,7 +14,6 @@ from robot_layouts.data.playing.command_options import (
     megabytes,
     stoppable,
 )
-from robot_layouts.data.playing.seeds import seed_lines
 from robot_layouts.data.reading.manifest import FILE_SIZE
 from robots import RecordingError
 from tasks.cell_options import Cell
@@ -98,7 +95,7 @@ def record(
     except (RecordingError, WorkerError):
         print(f"stopped; {status.kept}", file=sys.stderr)
         raise
-    _report(summary, out / recording.FILE)
+    print(summary)
     return 1 if summary.failed else 0
 
 
@@ -131,23 +128,3 @@ class _Status:
         done = summary.already + len(summary.played)
         who = f"; {len(summary.workers)} workers" if len(summary.workers) > 1 else ""
         self._line.update(done, f"recording (succeeded so far: {solved}{who})")
-
-
-def _report(summary: Summary, path: Path) -> None:
-    played = summary.played.values()
-    print(f"{path}: {plural(summary.recorded, 'episode')}")
-    if played:
-        solved = sum(score.success for score in played)
-        steps = sum(score.steps for score in played) / len(played)
-        new = plural(len(played), "new episode")
-        print(f"{new}, {solved} with success, {steps:.1f} steps on average")
-        if len(summary.workers) > 1:
-            print(f"played by {len(summary.workers)} workers")
-    failed = {seed: score.reason for seed, score in summary.played.items() if not score.success}
-    for line in seed_lines("no success", dict(sorted(failed.items()))):
-        print(line)
-    for death in summary.deaths:
-        print(f"replaced: {death}")
-    reasons = {seed: str(error) for seed, error in sorted(summary.failed.items())}
-    for line in seed_lines("not recorded", reasons):
-        print(line)
