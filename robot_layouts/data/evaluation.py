@@ -130,8 +130,8 @@ def evaluate(
 
     Raises:
         UnknownNameError: If the task, a place, a robot or a field is unknown.
-        TaskError: If the task cannot be made like that or has no expert, a number makes no sense,
-            or there are no seeds or one is there twice.
+        TaskError: If the task cannot be made like that or has no expert, a number is out
+            of range, there are no seeds, or one is given twice.
         UnwritableFileError: If the receipt cannot be written.
         AssetError: If the receipt needs robot files that cannot be found.
         ReceiptError: If it needs files of the policy that cannot be read.

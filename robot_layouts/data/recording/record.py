@@ -84,7 +84,7 @@ class Actors:
 
         Raises:
             TaskError: If the task has no expert, something cannot be imported or called, or
-                somebody is to take over from an expert, who does not look.
+                a takeover or corrector is given for an expert.
             RecordingError: If a policy's file cannot be read.
         """
         if isinstance(policy, str) and policy == EXPERT:
@@ -115,7 +115,7 @@ class Actors:
         if self.actors[0].kind == kinds.EXPERT:
             return replace(episode, actor=None)
         turns = episode.actor
-        assert turns is not None  # whoever plays keeps them
+        assert turns is not None  # the player keeps them
         source, actor = episode_source(self.actors, turns, self.corrector)
         return replace(episode, source=source, actor=actor)
 
