@@ -48,6 +48,7 @@ check: $(VENV)/.check
 	$(RUN) -m pyright --pythonpath $(RUN)
 	$(VENV)/bin/lint-imports
 	$(RUN) .ci/budget.py
+	$(RUN) .ci/house.py
 	$(RUN) -m parity tables --check
 	$(RUN) -m benchmarks tables --check
 	$(RUN) -m benchmarks gallery --check

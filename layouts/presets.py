@@ -4,11 +4,11 @@ Every preset turns robots by where they reach out at home (`Placement.facing`), 
 whose own front is not its base's +x faces like the others.
 
 A distance given as ``"auto"`` comes from the robots' reach; see `layouts.distances`. Where it has
-to serve several pairs of neighbours, it is that of the pair that asks for the most. Where a robot
-is no arm of the catalogue, the layout is also checked as by `Layout.validate`, which reads their
-files, and stood so much farther apart that no robots collide; if one collides with itself, that is
-an error. At a table of a given size nobody is moved: a task or `Layout.validate` checks it. Without
-python-fcl there is no such check, and the distance comes from reach alone.
+to serve several pairs of neighbours, it is that of the pair that asks for the most. If a robot is
+not an arm of the catalogue, the layout is also checked as by `Layout.validate`, which reads the
+robots' files, and the robots are moved apart until none collide; if one collides with itself, that
+is an error. At a table of a given size no robot is moved: a task or `Layout.validate` checks it.
+Without python-fcl there is no such check, and the distance comes from reach alone.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def single(robots: Mapping[str, RobotLike], *, keyframe: str | None = None) -> L
 
 
 def side_by_side(
-    robots: Mapping[str, RobotLike], *, spacing: Distance, keyframe: str | None = "rest"
+    robots: Mapping[str, RobotLike], *, spacing: Distance = "auto", keyframe: str | None = "rest"
 ) -> Layout:
     """Robots in a row along y through the origin, all facing +x; the first at the smallest y.
 
@@ -95,7 +95,7 @@ def side_by_side(
 
 
 def face_to_face(
-    robots: Mapping[str, RobotLike], *, spacing: Distance, keyframe: str | None = "rest"
+    robots: Mapping[str, RobotLike], *, spacing: Distance = "auto", keyframe: str | None = "rest"
 ) -> Layout:
     """Two robots on the y axis, looking at each other across the origin; the first at -y.
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from layouts.layout import Layout
-from layouts.placement import Placement, RobotLike, check_robots, faced, load_robot
+from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
 from robot_layouts.core.quoting import shown
 from robot_layouts.kinematics.quaternions import yaw_quaternion
 from robot_layouts.kinematics.rotations import Floats, rotate
@@ -55,12 +55,12 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
         if robot.limbs:
             return Layout({NAME: _body(robot, layout)}, layout.frames)
         robots = dict.fromkeys(layout, robot)
-    check_robots(robots)
-    for place in robots:
+    loaded = load_robots(robots)
+    for place in loaded:
         if place not in layout:
             raise UnknownNameError("place", place, layout)
     middle = _middle(layout)
-    changed = {place: _moved(layout[place], load_robot(r), middle) for place, r in robots.items()}
+    changed = {place: _moved(layout[place], robot, middle) for place, robot in loaded.items()}
     return Layout({**layout, **changed}, layout.frames)
 
 

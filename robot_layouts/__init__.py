@@ -18,6 +18,7 @@ How robots move:
 What happened:
     record, evaluate, Evaluation: Episodes that an expert or a policy plays.
     Recording: What was recorded.
+    view: A layout, an environment or a recording, in a browser.
     Receipt, verify: Scores that anyone can play again.
 
 Importing this loads none of it: each name is imported when it is first used.
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
         side_by_side,
         single,
     )
-    from robot_layouts.data import Evaluation, evaluate, record
+    from robot_layouts.data import Evaluation, evaluate, record, view
     from robot_layouts.data.reading.recording import Recording
     from robot_layouts.data.receipts import Receipt, verify
     from robot_layouts.experts import find_expert, register_expert
@@ -88,6 +89,7 @@ __all__ = [
     "side_by_side",
     "single",
     "verify",
+    "view",
 ]
 
 _HOMES = {
@@ -102,7 +104,7 @@ _HOMES = {
     ),
     "robot_layouts.motion": ("Motion", "RegionGoal", "TcpGoal", "plan"),
     "robot_layouts.experts": ("find_expert", "register_expert"),
-    "robot_layouts.data": ("Evaluation", "evaluate", "record"),
+    "robot_layouts.data": ("Evaluation", "evaluate", "record", "view"),
     "robot_layouts.data.reading.recording": ("Recording",),
     "robot_layouts.data.receipts": ("Receipt", "verify"),
 }

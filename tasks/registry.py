@@ -270,6 +270,33 @@ def make_scenario(
     return scenario
 
 
+def scenario_of(
+    task: str | TaskEnv, num_envs: int = 1, **making: Unpack[MakingFields]
+) -> tuple[type[MultiRobotTask], Scenario]:
+    """Return the class of a task, and how to make it: of its name, or as an environment was made.
+
+    Args:
+        task: Its id or another of its names, or an environment of it.
+        num_envs: Number of environments to make.
+        making: Arguments of `make`; none if an environment is given.
+
+    Raises:
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that, or an environment is given and arguments.
+    """
+    from tasks.engine.env import TaskEnv
+
+    if not isinstance(task, TaskEnv):
+        cls = get_task_class(task)
+        return cls, make_scenario(cls, num_envs, **making)
+    if making:
+        raise TaskError(
+            f"{', '.join(making)} given beside an environment of {task.task_id}, which is played as"
+            " it was made; pass them to tasks.make, or give the task's id"
+        )
+    return task.task_class, replace(task.scenario, num_envs=num_envs)
+
+
 class UnexpectedArgumentError(UnknownNameError, TypeError):
     """An argument that tasks are not made with (also a ``TypeError``, as Python's own error is).
 

@@ -59,7 +59,7 @@ def checked_whole(
     """Return a whole number between two bounds, both included, as an int.
 
     Raises:
-        RobotLayoutsError: ``error``, if it is not such a number; a truth value is none.
+        RobotLayoutsError: ``error``, if it is not such a number; a truth value is not.
     """
     whole = int(value) if isinstance(value, Integral) and not _is_flag(value) else None
     if whole is None or whole < low or (high is not None and whole > high):

@@ -58,7 +58,7 @@ def printable(text: str) -> str:
 def notice(text: str) -> None:
     """Print a line on stderr, where there is one; it is never a reason to fail."""
     if sys.stderr is not None:  # pyright: ignore[reportUnnecessaryComparison]  # in a daemon
-        with suppress(OSError, ValueError):  # nobody reads it, or it was closed
+        with suppress(OSError, ValueError):  # its reader is gone, or it was closed
             print(text, file=sys.stderr, flush=True)
 
 
@@ -70,7 +70,7 @@ def is_watched() -> bool:
 def start(main: Callable[[], int]) -> NoReturn:
     """Run a command as this process, and end it.
 
-    Output that nobody reads any more, or that was closed from the start, is dropped; the command
+    Output whose reader is gone, or that was closed from the start, is dropped; the command
     goes on and ends with its own exit code. Ctrl-C ends it with 130.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:  # closed ones, which others inherit
@@ -109,6 +109,6 @@ class _Output(io.FileIO):
         except OSError as error:
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
             if self.fileno() == 1 and error.errno not in _NOBODY_READS:
-                words = f"cannot write what is to be printed: {error.strerror}"
+                words = f"cannot write the output: {error.strerror}"
                 raise OutputError(words) from error
             return len(data)

@@ -1,4 +1,4 @@
-"""What a module answers to whoever asks it for a name that it does not have."""
+"""The error of a module that is asked for a name that it does not have."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ def _make_parent(target: Path) -> None:
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError) as error:
-        raise NotADirectoryError(error.errno, f"{target.parent} is no folder") from error
+        raise NotADirectoryError(error.errno, f"{target.parent} is not a folder") from error
 
 
 def _sync(path: Path) -> None:

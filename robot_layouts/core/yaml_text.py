@@ -32,5 +32,5 @@ def compose(text: str) -> Any:
         raise ValueError(f"line {line}: {words}") from None
     except RecursionError:
         raise ValueError("this is nested too deeply") from None
-    except (ValueError, OverflowError) as error:  # a number in a directive or escape that is none
+    except (ValueError, OverflowError) as error:  # an invalid number in a directive or escape
         raise ValueError(f"this is not YAML: {error}") from None

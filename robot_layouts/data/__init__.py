@@ -12,10 +12,14 @@ from robot_layouts.core.module_names import missing_name
 if TYPE_CHECKING:
     from robot_layouts.data.evaluation import Evaluation, Score, evaluate
     from robot_layouts.data.recording.record import record
+    from robot_layouts.data.view import view
 
-__all__ = ["Evaluation", "Score", "evaluate", "record"]
+__all__ = ["Evaluation", "Score", "evaluate", "record", "view"]
 
-_HOMES = {"record": "robot_layouts.data.recording.record"}
+_HOMES = {
+    "record": "robot_layouts.data.recording.record",
+    "view": "robot_layouts.data.view",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -161,6 +161,8 @@ def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
     from robot_layouts.data.reading.recorded_task import task_for
     from tasks.view import task_cell
 
+    if not len(file):
+        raise TrajectoryError(f"{file.path} holds no episodes")
     if not 0 <= number < len(file):
         raise TrajectoryError(
             f"{file.path} has no episode {number}; it has {len(file)}, from 0 to {len(file) - 1}"

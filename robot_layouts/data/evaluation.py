@@ -21,13 +21,13 @@ from robot_layouts.data.playing.together import Cast, cast_of, grouped
 from robot_layouts.data.receipts.provenance import describe_job, receipt_of
 from robot_layouts.data.receipts.receipt import Receipt
 from robots import TaskError
-from tasks import get_task_class
 from tasks.episode import Policy, Score
-from tasks.registry import make_scenario
+from tasks.registry import scenario_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from tasks import TaskEnv
     from tasks.engine.scenario import MakingFields
 
 
@@ -86,7 +86,7 @@ class Evaluation:
 
 def evaluate(
     policy: Policy | str,
-    task: str,
+    task: str | TaskEnv,
     seeds: Sequence[int],
     *,
     num_envs: int = 1,
@@ -110,7 +110,7 @@ def evaluate(
             not copy, such as a function, is not copied for each episode. Or where one is imported
             from, ``"module:name"``. Or ``"expert"``, which makes a plan for each seed and carries
             it out; where it finds none, the episode is a failure of 0 steps, whose reason is given.
-        task: Id of the task.
+        task: Id of the task, or an environment of it, as which every episode is made.
         seeds: Which episodes, each once.
         num_envs: How many episodes each process plays at once, in environments of one task. The
             policy is called, and copied, for each as if that were alone, so that the scores are
@@ -125,12 +125,13 @@ def evaluate(
             take for ever.
         receipt: File to write a receipt to, json that `verify` plays again.
         on_event: Called with each event of the executor, to show progress.
-        making: Arguments of `tasks.make`, such as ``robots`` and ``obs_mode``.
+        making: Arguments of `tasks.make`, such as ``robots`` and ``obs_mode``, if ``task`` is an
+            id.
 
     Raises:
         UnknownNameError: If the task, a place, a robot or a field is unknown.
-        TaskError: If the task cannot be made like that or has no expert, a number makes no sense,
-            or there are no seeds or one is there twice.
+        TaskError: If the task cannot be made like that or has no expert, a number is out
+            of range, there are no seeds, or one is given twice.
         UnwritableFileError: If the receipt cannot be written.
         AssetError: If the receipt needs robot files that cannot be found.
         ReceiptError: If it needs files of the policy that cannot be read.
@@ -138,12 +139,13 @@ def evaluate(
             it again and again.
     """
     executor = choose_executor(workers, executor, episode_timeout)
-    cls, seeds = get_task_class(task), checked_seeds(seeds)
+    seeds = checked_seeds(seeds)
     if not seeds:
         raise TaskError("no seeds were given; an evaluation plays one or more")
     checked_whole("num_envs", num_envs, 1, None, TaskError)
     num_envs = min(num_envs, len(seeds))
-    (cast, imported), scenario = cast_of(policy, cls), make_scenario(cls, num_envs, **making)
+    cls, scenario = scenario_of(task, num_envs, **making)
+    cast, imported = cast_of(policy, cls)
     scenario.check(cls.reward_modes)
     job = EvaluationJob(cls, scenario, cast, grouped(seeds, num_envs), receipt is not None)
     if receipt is None:

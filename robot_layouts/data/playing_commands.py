@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from robot_layouts.core.cli import Count, Folder, Seed, Word
 from robot_layouts.core.commands import printable
-from robot_layouts.core.pages import plural
 from robot_layouts.data.playing.command_options import (
     GOES_ON,
     Acting,
@@ -22,7 +21,6 @@ from robot_layouts.data.playing.command_options import (
     stoppable,
     tell,
 )
-from robot_layouts.data.playing.seeds import seed_lines
 from robot_layouts.data.reading.json_files import FILE_SIZE
 from robots import RecordingError, RobotDescriptor
 from tasks.cell_options import Cell, PlacedRobot, chosen_robots
@@ -81,7 +79,6 @@ def record(
     """
     from robot_layouts.core.processes.start import WorkerError
     from robot_layouts.core.progress import Progress
-    from robot_layouts.data.reading.recording import FILE
     from robot_layouts.data.recording.record import record as recorded
 
     executor, line = players.executor(), Progress(episodes, "episodes")
@@ -116,28 +113,8 @@ def record(
     except (RecordingError, WorkerError):
         print(f"stopped; {kept}", file=sys.stderr)
         raise
-    _report(summary, out / FILE)
+    print(summary)
     return 1 if summary.failed else 0
-
-
-def _report(summary: Summary, path: Path) -> None:
-    played = summary.played.values()
-    print(f"{path}: {plural(summary.recorded, 'episode')}")
-    if played:
-        solved = sum(score.success for score in played)
-        steps = sum(score.steps for score in played) / len(played)
-        new = plural(len(played), "new episode")
-        print(f"{new}, {solved} with success, {steps:.1f} steps on average")
-        if len(summary.workers) > 1:
-            print(f"played by {len(summary.workers)} workers")
-    failed = {seed: score.reason for seed, score in summary.played.items() if not score.success}
-    for line in seed_lines("no success", dict(sorted(failed.items()))):
-        print(line)
-    for death in summary.deaths:
-        print(f"replaced: {death}")
-    reasons = {seed: str(error) for seed, error in sorted(summary.failed.items())}
-    for line in seed_lines("not recorded", reasons):
-        print(line)
 
 
 def evaluate(

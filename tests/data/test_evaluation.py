@@ -30,6 +30,7 @@ def test_who_plays_makes_no_difference():
     here = evaluate(Wanders(0.5), TASK, range(4), executor=Here())
     assert evaluate(Wanders(0.5), TASK, [3, 1, 0, 2], workers=2).scores == here.scores
     assert len(set(here.returns.values())) == 4
+    assert evaluate(Wanders(0.5), tasks.make(TASK), range(4), executor=Here()) == here
     other = evaluate(Wanders(0.6), TASK, [2], executor=Here())
     assert other.returns[2] != here.returns[2]
 

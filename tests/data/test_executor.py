@@ -4,6 +4,8 @@ import multiprocessing
 import os
 import random
 import re
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -133,6 +135,27 @@ def test_long_silence_is_said(monkeypatch):
 
 
 # -- what cannot be sent, loaded or understood ---------------------------------------------------
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("own", [False, True])
+def test_a_program_without_a_guard_plays_what_it_does_not_define(own, tmp_path):
+    (tmp_path / "program.py").write_text(
+        "from robot_layouts.data.playing.executor import ProcessExecutor\n"
+        "from tests.data.plays import Play\n"
+        f"{'class Play(Play): pass' * own}\n"
+        "print(len(list(ProcessExecutor(2).run(Play(), range(3)))))\n"
+    )
+    env = {**os.environ, "PYTHONPATH": str(ROOT)}
+    words = [sys.executable, str(tmp_path / "program.py")]
+    done = subprocess.run(words, env=env, capture_output=True, text=True, timeout=120)
+    if not own:
+        assert (done.returncode, done.stdout) == (0, "3\n"), done.stderr
+        return
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert "worker processes died before they could play anything" in last
+    assert last.endswith("runs belongs under `if __name__ == '__main__':`")
 
 
 @pytest.mark.long

@@ -22,6 +22,7 @@ from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts import registry
 from robot_layouts.experts.maniskill.pick_cube import pick_cube
 from robot_layouts.experts.rehearsal import Plan
+from robots import TaskError
 from tasks import TaskEnv
 from tasks.episode import play
 from tests.data.plays import NO_PLAN, TASK, at_random
@@ -359,3 +360,26 @@ def test_a_full_disk_ends_it_with_what_is_finished(small_disk):
     assert parts > 3
     assert kept == f"stopped; {parts} episodes are recorded"
     wait_until_nobody_is_left(process)
+
+
+class TestAnEnvironment:
+    def test_its_episodes_are_made_as_it_was(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        env = tasks.make(TASK, num_envs=3, control_mode="pd_joint_pos", max_episode_steps=7)
+        summary = record(env, episodes=2, workers=0)
+        assert summary.folder == Path("runs/recordings") / TASK
+        assert "2 new episodes" in str(summary)
+        with Recording(summary) as file:
+            assert (len(file), file.seeds, file.control_mode) == (2, (0, 1), "pd_joint_pos")
+            assert file.max_episode_steps == 7
+
+    def test_it_takes_no_arguments_of_make(self, tmp_path):
+        with pytest.raises(TaskError, match=f"robots given beside an environment of {TASK}"):
+            record(tasks.make(TASK), [0], tmp_path, robots="panda")
+        assert [*tmp_path.iterdir()] == []
+
+
+@pytest.mark.parametrize("which", [{}, {"seeds": [0], "episodes": 1}])
+def test_seeds_or_episodes(which, tmp_path):
+    with pytest.raises(TaskError, match="give either seeds or episodes"):
+        record(TASK, folder=tmp_path, **which)

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 
+import robot_layouts as rl
 from benchmarks.teleop import served
 from robot_layouts.__main__ import main
 from robot_layouts.data.commands import episode_cell
@@ -56,6 +57,24 @@ def test_an_episode_that_is_not_there(recording):
         pytest.raises(TrajectoryError, match="has no episode 2; it has 2, from 0 to 1"),
     ):
         episode_cell(file, 2)
+
+
+@pytest.mark.long
+def test_view_shows_what_it_is_given(recording, tmp_path, capsys):
+    cell = rl.face_to_face({"left": "panda", "right": "so100"})
+    env = rl.make("PushCube-v1")
+    page = tmp_path / "page.html"
+    with rl.Recording(recording) as opened:
+        for shown, title in {
+            cell: "left panda, right so100",
+            env: "PushCube-v1",
+            recording: "TwoRobotPickCube-v1, episode 1 of trajectory.h5",
+            recording.parent: "TwoRobotPickCube-v1, episode 1 of trajectory.h5",
+            opened: "TwoRobotPickCube-v1, episode 1 of trajectory.h5",
+        }.items():
+            rl.view(shown, html=page, episode=1)
+            assert f"<title>{title}</title>" in page.read_text(encoding="utf-8")
+    env.close()
 
 
 def test_a_recording_of_another_task(recording, capsys):

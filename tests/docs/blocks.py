@@ -27,6 +27,7 @@ RUN = ("python", "console")
 SHORTER = {
     "learn(100_000)": "learn(1)",
     "range(100)": "range(2)",
+    "episodes=100": "episodes=2",
     "num_envs=64": "num_envs=4",
     "batch_size=32": "batch_size=2",
     "--episodes 20": "--episodes 2",

@@ -100,7 +100,7 @@ def play():
         tell("refused", str(error))
 """
 _PROGRAMS = {
-    "a program without `if __name__ == '__main__'` catches what its workers refuse": (
+    "a program without `if __name__ == '__main__'`": (
         _OPENING + "\nplay()\n",
         GOES_ON,
     ),

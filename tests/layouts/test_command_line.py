@@ -81,7 +81,7 @@ def test_show_names_file_and_line(tmp_path, capsys):
     [
         ("face_to_fase a=panda b=panda", "unknown layout preset 'face_to_fase'. Did you mean"),
         ("single arm=panda --spacing 1", "single takes no --spacing; it takes --keyframe"),
-        ("face_to_face a=panda b=panda", "face_to_face needs --spacing"),
+        ("face_to_face a=panda", "face_to_face places 2 robots; 1 given"),
         ("side_by_side a=panda --spacing nan", "spacing is nan m"),
         ("PushT-v1 left=panda", "unknown robot of this layout 'left'. Choices: arm."),
         ("PushT-v1 --radius 1", "PushT-v1 says where robots stand; it takes no --radius"),

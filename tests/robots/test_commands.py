@@ -117,7 +117,7 @@ def test_closed_streams_are_dropped_and_never_become_another_file(tmp_path, clos
 def test_output_that_does_not_fit_the_disk_is_one_error():
     done = script("start(lambda: exit_code(lambda: print('x' * 99)))", "> /dev/full")
     assert done.returncode == 1
-    assert done.stderr == "error: cannot write what is to be printed: No space left on device\n"
+    assert done.stderr == "error: cannot write the output: No space left on device\n"
 
 
 def test_progress_that_does_not_fit_the_disk_is_dropped():

@@ -72,7 +72,7 @@ def test_a_folder_appears_whole(tmp_path):
     ("name", "reason"),
     [
         ("folder", "Is a directory"),
-        ("file/cell.yaml", "file is no folder"),
+        ("file/cell.yaml", "file is not a folder"),
         ("nul\0", "a null character is in its name"),
         ("x" * 300, "File name too long"),
     ],

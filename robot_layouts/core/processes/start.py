@@ -62,7 +62,7 @@ def preload(*modules: str) -> None:
     _preloaded.update(dict.fromkeys(modules))
 
 
-def start(work: Callable[..., None], *arguments: Any) -> BaseProcess:
+def start(work: Callable[..., None], *arguments: Any, with_main: bool = True) -> BaseProcess:
     """Start a daemonic process that ends with this one, however this one ends.
 
     It never sees Ctrl-C: a terminal sends it to all, one is to act on it. A daemonic process may
@@ -71,13 +71,15 @@ def start(work: Callable[..., None], *arguments: Any) -> BaseProcess:
     Args:
         work: What it runs, a function of a module.
         arguments: What that is called with; can be pickled.
+        with_main: Whether it imports this process's main module, as it must to load anything that
+            is defined there.
 
     Raises:
         ProcessError: If descriptors, processes or memory run out, or the main module does not
             guard what it runs.
     """
     result: Future[BaseProcess] = Future()
-    _starter().put((functools.partial(_start, work, arguments), result))
+    _starter().put((functools.partial(_start, work, arguments, with_main), result))
     with enough():
         try:
             process = result.result()
@@ -115,7 +117,7 @@ def end_with_parent() -> None:
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
-def _start(work: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProcess:
+def _start(work: Callable[..., None], arguments: tuple[Any, ...], with_main: bool) -> BaseProcess:
     """Start a process, in the thread that starts all of them."""
     global _server_is_inherited
     _expect_descriptors()
@@ -141,7 +143,7 @@ def _start(work: Callable[..., None], arguments: tuple[Any, ...]) -> BaseProcess
         daemon=True,
     )
     try:
-        with _lock, _able_to_start():
+        with _lock, _able_to_start(with_main):
             process.start()
     except EOFError:
         raise ProcessError(
@@ -206,24 +208,28 @@ def _server_environment() -> Generator[None]:
 
 
 @contextmanager
-def _able_to_start() -> Generator[None]:
+def _able_to_start(with_main: bool) -> Generator[None]:
     """Let `multiprocessing` start processes that it would refuse, or that would fail.
 
     It fears that children of a daemonic process outlive it, and looks for the file of a main
-    module that was read from standard input.
+    module that was read from standard input. It imports a main module by ``__spec__`` or
+    ``__file__``.
     """
     this, main = multiprocessing.current_process(), sys.modules["__main__"]
     daemonic, this.daemon = this.daemon, False
-    file = getattr(main, "__file__", None)
-    no_file = file is not None and not os.path.exists(file)
-    if no_file:
-        del main.__file__
+    names = ("__file__", "__spec__")
+    found = {name: vars(main)[name] for name in names if name in vars(main)}
+    if not with_main:
+        main.__file__ = main.__spec__ = None
+    elif not os.path.exists(found.get("__file__") or ""):
+        main.__file__ = None
     try:
         yield
     finally:
         this.daemon = daemonic
-        if no_file:
-            main.__file__ = file
+        for name in names:
+            vars(main).pop(name, None)
+        vars(main).update(found)
 
 
 @functools.cache

@@ -127,12 +127,15 @@ class Worker:
         last: Number of its last request.
     """
 
-    def __init__(self, make: bytes, timeout: float | None = None) -> None:
+    def __init__(
+        self, make: bytes, timeout: float | None = None, *, with_main: bool = True
+    ) -> None:
         """Start it.
 
         Args:
             make: A `packed` function without arguments, which returns what carries out requests.
             timeout: Seconds that sending may take; None waits for ever.
+            with_main: Whether it imports the main module; see `start`.
 
         Raises:
             ProcessError: If it cannot be started.
@@ -141,7 +144,7 @@ class Worker:
             self.socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with closing(theirs):
             try:
-                self._process = start(_serve, theirs)
+                self._process = start(_serve, theirs, with_main=with_main)
             except BaseException:
                 self.socket.close()
                 raise
@@ -242,9 +245,9 @@ class Pool:
         self._poller = select.poll()
         self._owners: dict[int, Worker] = {}  # file descriptor → whose it is
 
-    def spawn(self, make: bytes, timeout: float | None = None) -> Worker:
+    def spawn(self, make: bytes, timeout: float | None = None, *, with_main: bool = True) -> Worker:
         """Start a worker; see `Worker`."""
-        worker = Worker(make, timeout)
+        worker = Worker(make, timeout, with_main=with_main)
         self.workers.append(worker)
         # The end of the process is watched as well: a process that it forked may hold its end of
         # the connection open.

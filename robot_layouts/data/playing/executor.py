@@ -95,8 +95,8 @@ class _Processes:
         self._job, self._pool = packed(prepare), Pool()
 
     def spawn(self) -> Worker:
-        """Start a process."""
-        return self._pool.spawn(self._job, START_SECONDS)
+        """Start a process, which runs the script of the user again only if the job is from it."""
+        return self._pool.spawn(self._job, START_SECONDS, with_main=b"__main__" in self._job)
 
     def wait(self, seconds: float) -> list[tuple[Worker, Reply]]:
         """Wait for replies for a while (s)."""

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 
-import tasks
-from layouts import Layout
-from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.pages import plural
 from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import as_ours
 from robot_layouts.data.actors import (
@@ -31,7 +30,7 @@ from robot_layouts.data.actors import (
 )
 from robot_layouts.data.playing.executor import Executor, choose_executor, play_all
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event, WorkersDied
-from robot_layouts.data.playing.seeds import checked_seeds
+from robot_layouts.data.playing.seeds import checked_seeds, seed_lines
 from robot_layouts.data.playing.together import (
     BatchError,
     Cast,
@@ -48,11 +47,16 @@ from robot_layouts.data.recording.episode_files import PartEncoder
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts import find_expert
 from robots import RecordingError, TaskError
-from tasks import MultiRobotTask
+from tasks import MultiRobotTask, TaskEnv
 from tasks.episode import PlayedEpisode, Policy, Score
-from tasks.randomization.declaration import Randomization
-from tasks.registry import make_scenario
+from tasks.registry import scenario_of
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from tasks.engine.scenario import MakingFields
+
+FOLDER = Path("runs/recordings")  # of recordings, each in a folder called as its task
 _TYPES = {EXPERT: "scripted", POLICY: "policy", PERSON: "human"}
 LOST_IN_A_ROW = 10  # episodes that workers died of, and none that was played, until all ends
 
@@ -84,7 +88,7 @@ class Actors:
 
         Raises:
             TaskError: If the task has no expert, something cannot be imported or called, or
-                there is a takeover for an expert, whose plan ignores observations.
+                a takeover or corrector is given for an expert.
             RecordingError: If a policy's file cannot be read.
         """
         if isinstance(policy, str) and policy == EXPERT:
@@ -115,7 +119,7 @@ class Actors:
         if self.actors[0].kind == EXPERT:
             return replace(episode, actor=None)
         turns = episode.actor
-        assert turns is not None  # whoever plays keeps them
+        assert turns is not None  # the player keeps them
         source, actor = episode_source(self.actors, turns, self.corrector)
         return replace(episode, source=source, actor=actor)
 
@@ -189,6 +193,7 @@ class Summary:
     """The result of a recording.
 
     Attributes:
+        folder: Where the recording is. The summary itself is a path, too: that of this folder.
         recorded: Episodes in the file in the end.
         already: How many of those asked for were there before.
         damaged: Episodes that were there before and are damaged, in words.
@@ -199,6 +204,7 @@ class Summary:
         workers: Who played, in words.
     """
 
+    folder: Path
     recorded: int = 0
     already: int = 0
     damaged: list[str] = field(default_factory=list[str])
@@ -207,47 +213,70 @@ class Summary:
     deaths: list[str] = field(default_factory=list[str])
     workers: set[str] = field(default_factory=set[str])
 
+    @property
+    def path(self) -> Path:
+        """The first h5 file."""
+        return self.folder / FILE
+
+    def __fspath__(self) -> str:
+        """Return the recording's folder."""
+        return str(self.folder)
+
+    def __str__(self) -> str:
+        """Say in a few lines what was recorded and what was not."""
+        played = self.played.values()
+        lines = [f"{self.path}: {plural(self.recorded, 'episode')}"]
+        if played:
+            solved = sum(score.success for score in played)
+            steps = sum(score.steps for score in played) / len(played)
+            new = plural(len(played), "new episode")
+            lines.append(f"{new}, {solved} with success, {steps:.1f} steps on average")
+            if len(self.workers) > 1:
+                lines.append(f"played by {len(self.workers)} workers")
+        failed = {seed: score.reason for seed, score in self.played.items() if not score.success}
+        reasons = {seed: str(error) for seed, error in sorted(self.failed.items())}
+        return "\n".join(
+            [
+                *lines,
+                *seed_lines("no success", dict(sorted(failed.items()))),
+                *(f"replaced: {death}" for death in self.deaths),
+                *seed_lines("not recorded", reasons),
+            ]
+        )
+
 
 def record(
-    task_id: str,
-    seeds: Sequence[int],
-    folder: Path,
+    task: str | TaskEnv,
+    seeds: Sequence[int] | None = None,
+    folder: str | PathLike[str] | None = None,
     executor: Executor | None = None,
     *,
+    episodes: int | None = None,
     workers: int | None = None,
     episode_timeout: float | None = EPISODE_SECONDS,
-    control_mode: str | Mapping[str, str] | None = None,
-    layout: Layout | None = None,
-    robots: RobotLike | Mapping[str, RobotLike] | None = None,
-    bystanders: str | None = None,
     policy: Policy | str = EXPERT,
     takeover: Policy | str | None = None,
     corrector: Policy | str | None = None,
-    obs_mode: str = "state",
-    camera_size: tuple[int, int] | None = None,
     num_envs: int = 1,
-    randomization: Randomization | None = None,
     file_size: float = FILE_SIZE,
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
+    **making: Unpack[MakingFields],
 ) -> Summary:
     """Record the episodes of some seeds; those that are in the folder already are kept.
 
     Args:
-        task_id: The task.
+        task: Id of the task, or an environment of it, as which every episode is made.
         seeds: Which episodes.
-        folder: Where ``trajectory.h5`` and ``trajectory.json`` are written.
-        executor: Who plays, such as `RayExecutor`; None: processes
-            of this machine.
+        folder: Where ``trajectory.h5`` and ``trajectory.json`` are written; by default
+            ``runs/recordings/TASK``.
+        executor: Who plays, such as `RayExecutor`; None: processes of this machine.
+        episodes: How many episodes, instead of ``seeds``: those of seeds 0, 1, 2, …
         workers: How many processes; None: one for each core that this process may use; 0: none,
             but this one.
         episode_timeout: Seconds that an episode may take in a worker until that is ended and the
             episode played again, three times in all; None if it may take for ever. An episode that
             ends its worker each time is left out, with those that are played at once with it, and
             tried again by the next recording.
-        control_mode: Control mode of the recorded actions, or those by arm; see `tasks.Scenario`.
-        layout: Where robots stand, if not where the task's own do; see `tasks.make`.
-        robots: Other robots for some places; see `tasks.make`.
-        bystanders: What robots do that have no place in the task; see `tasks.Scenario`.
         policy: ``"expert"``, whose plan for each seed is carried out to its end, or who acts at
             every step: maps the observation, (1, D) float32 if ``obs_mode`` is ``"state"``, to the
             action, (A,) or (1, A); an episode ends with the first step that is terminated or
@@ -259,21 +288,23 @@ def record(
             ``"module:name"``.
         corrector: Asked at every step what it would do: maps the observation to an action, which
             is recorded beside the one that is carried out. Or ``"module:name"``.
-        obs_mode: What they observe; see `tasks.make`. Observations are not recorded.
-        camera_size: Width and height of the pictures that they observe (pixels), if not each
-            camera's own.
         num_envs: How many episodes each process plays at once, in environments of one task. What
             is recorded is the same, and so it is with a policy whose attribute ``batched`` is True
             if each row of its actions follows from that row of the observations alone; see
             `robot_layouts.data.evaluate`.
-        randomization: What varies from episode to episode, if not what the task says.
         file_size: Size at which a further h5 file is begun (MB); see `Recorder`.
         on_event: Called once at the start without an event, and after every event.
+        making: Arguments of `tasks.make`, such as ``layout``, ``robots`` and ``control_mode``, if
+            ``task`` is an id. ``obs_mode`` is what policies observe; observations are not recorded.
+
+    Returns:
+        What was recorded. It stands for the folder wherever a path does: ``Recording(summary)``.
 
     Raises:
-        UnknownNameError: If there is no such task.
-        TaskError: If the task has no expert, a policy cannot be imported or called, a number makes
-            no sense, or a seed is there twice.
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task has no expert or cannot be made like that, a policy cannot be
+            imported or called, a number is out of range, a seed is given twice, or not exactly one
+            of ``seeds`` and ``episodes`` is given.
         RecordingError: If the folder cannot be written or holds a recording of something else, or
             a policy's file cannot be read; the finished episodes are kept.
         WorkerError: If workers cannot be started, die of ten episodes in a row, or end before all
@@ -281,19 +312,18 @@ def record(
         KeyboardInterrupt: If interrupted; they are kept, too.
     """
     executor = choose_executor(workers, executor, episode_timeout)
-    cls, seeds = tasks.get_task_class(task_id), checked_seeds(seeds)
+    if seeds is not None and episodes is None:
+        seeds = checked_seeds(seeds)
+    elif seeds is None and episodes is not None:
+        seeds = tuple(range(checked_whole("episodes", episodes, 1, None, TaskError)))
+    else:
+        raise TaskError("give either seeds or episodes: seeds=range(10, 20), or episodes=10")
+    cls, scenario = scenario_of(task, **making)
     checked_whole("num_envs", num_envs, 1, None, TaskError)
     cast, actors = Actors.cast(cls, policy, takeover, corrector)
-    cell: dict[str, Any] = {"layout": layout, "robots": robots, "bystanders": bystanders}
-    cell["camera_size"] = camera_size
-    if randomization is not None:
-        cell["randomization"] = randomization
-    scenario = make_scenario(cls, control_mode=control_mode, obs_mode=obs_mode, **cell)
     env = cls(scenario)
-    summary = Summary()
-    with Recorder(
-        folder / FILE, env, resume=True, file_size=file_size, **actors.header
-    ) as recorder:
+    summary = Summary(FOLDER / cls.task_id if folder is None else Path(folder))
+    with Recorder(summary.path, env, resume=True, file_size=file_size, **actors.header) as recorder:
         env.close()
         summary.damaged, there = recorder.damaged, recorder.seeds
         missing = [seed for seed in seeds if seed not in there]
