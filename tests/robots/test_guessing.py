@@ -392,6 +392,15 @@ class TestTool:
         parts.frame("grasptarget", last, "0.1 0 0")
         assert guess(parts, tmp_path).descriptor.tcp_link == "grasptarget"
 
+    def test_a_tcp_far_from_the_tips_is_kept_and_doubted(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.jaws(last, "a")
+        parts.frame("tcp", last, "0.2 0 0")
+        found = guess(parts, tmp_path)
+        assert found.descriptor.tcp_link == "tcp"
+        (doubt,) = (reason for reason in found.doubts if reason.startswith("TCP"))
+        assert "the finger tips meet 9 cm away, where no frame lies: tcp_offset=(-0.09" in doubt
+
     def test_finger_tips_go_before_the_flange(self, tmp_path):
         parts, last = single_arm(end="")
         parts.jaws(last, "a")
