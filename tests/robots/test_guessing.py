@@ -380,7 +380,7 @@ class TestFingers:
         found = guess(parts, tmp_path)
         assert found.descriptor.fingers is None
         reason = next(r for r in found.reasons if r.startswith("fingers"))
-        assert "fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS))" in reason
+        assert "Fingers((LINK, LINK), opening_signs=(1, 1), opening_axes=(WAY, WAY))" in reason
 
 
 class TestTool:
