@@ -348,12 +348,13 @@ class TestFingers:
         assert fingers.opening_signs == (1, -1)
         assert fingers.opening_axes == (axis, axis)
 
-    def test_a_jaw_opens_across_the_way_from_its_hinge(self, tmp_path):
+    @pytest.mark.parametrize("jaw", ["jaw", "a_link_fngr"])
+    def test_a_jaw_opens_across_the_way_from_its_hinge(self, tmp_path, jaw):
         parts, last = single_arm(end="")
-        parts.link("jaw", 0.05, "0.08 0.01 0.02", "0.05 0 0")
-        parts.joint("jaw_joint", last, "jaw", "0.03 0 0.03", axis="0 -1 0", limits=(0.0, 1.0))
+        parts.link(jaw, 0.05, "0.08 0.01 0.02", "0.05 0 0")
+        parts.joint("a_f1x", last, jaw, "0.03 0 0.03", axis="0 -1 0", limits=(0.0, 1.0))
         fingers = guess(parts, tmp_path).descriptor.fingers
-        assert fingers.links == (last, "jaw")
+        assert fingers.links == (last, jaw)
         assert fingers.max_angle == 110.0
         signed = np.array(fingers.opening_axes) * np.array(fingers.opening_signs)[:, None]
         assert signed[1] @ (0.0, 0.0, 1.0) > 0.95
