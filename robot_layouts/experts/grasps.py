@@ -51,7 +51,8 @@ def need_fingers(task: TaskEnv, plan: str, *robots: str) -> None:
             raise TaskError(
                 f"{plan} needs fingers on {' and '.join(map(repr, robots))}; {name!r} is a"
                 f" {robot.name}, which has none (if two links of it grasp, its field"
-                " fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS)) says so)"
+                " fingers=Fingers((LINK, LINK), opening_signs=(1, 1), opening_axes=(WAY, WAY)) says"
+                " so, with which way each opens in its own frame)"
             )
 
 

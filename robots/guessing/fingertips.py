@@ -208,8 +208,9 @@ def find_fingers(
     if tips is None or ends is None:
         return None, Doubt(
             f"{which}: none, as {'no two tips' if limb.fingers else 'no fingers'} are found, so"
-            " grasps go unnoticed; fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS)) with"
-            " the links that touch, and which way each opens in its own frame, changes that"
+            " grasps go unnoticed; fingers=Fingers((LINK, LINK), opening_signs=(1, 1),"
+            " opening_axes=(WAY, WAY)) with the links that touch, and which way each opens in its"
+            " own frame, changes that"
         )
     one, other = tips.touching(ends[0]), tips.touching(ends[1])
     swings = any(joint.type != "prismatic" for joint in limb.fingers)

@@ -77,10 +77,17 @@ def find_tool(
         if named:
             also = f"; so are {', '.join(named[1:])}" if named[1:] else ""
             reason = f"{which}: the link {named[0]}, named like {what} and rigid with {limb.palm}"
-            return Tool(named[0], (), reason + also)
+            away = _apart(*_missed(stance, tips, named[0])) if tips and tips.are_jaws else ""
+            return Tool(named[0], (), Doubt(reason + also + away) if away else reason + also)
     if tips is None:
         return _end(stance, limb, rigid, which)
     return _between(stance, limb, rigid, tips, which, between)
+
+
+def _missed(stance: Stance, tips: Fingertips, link: str) -> tuple[float, Vector3]:
+    """Return how far a frame is from between the tips (m), 0 if it is near, and where that is."""
+    distance = float(np.linalg.norm(stance.places((link,))[0] - tips.middle()))
+    return (distance if distance > BETWEEN else 0.0), _seen_from(stance, link, tips.middle())
 
 
 def _first_rigid(stance: Stance, link: str) -> str:

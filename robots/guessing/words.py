@@ -12,7 +12,7 @@ FINGER = (
     "proximal", "distal", "mcp", "pip", "dip", "gripper", "jaw", "claw", "pincer", "hand",
     "pad", "palm", "fingertip",
 )  # fmt: skip
-JAW = ("gripper", "jaw", "finger", "claw", "pincer", "knuckle", "clamp")
+JAW = ("gripper", "jaw", "finger", "fngr", "claw", "pincer", "knuckle", "clamp")
 WRIST = ("wrist", "roll", "yaw", "pitch", "rotate", "rotation", "flex")
 HEAD = (
     "head", "neck", "eye", "gaze", "camera", "cam", "laser", "lidar", "velodyne", "sensor",

@@ -348,12 +348,13 @@ class TestFingers:
         assert fingers.opening_signs == (1, -1)
         assert fingers.opening_axes == (axis, axis)
 
-    def test_a_jaw_opens_across_the_way_from_its_hinge(self, tmp_path):
+    @pytest.mark.parametrize("jaw", ["jaw", "a_link_fngr"])
+    def test_a_jaw_opens_across_the_way_from_its_hinge(self, tmp_path, jaw):
         parts, last = single_arm(end="")
-        parts.link("jaw", 0.05, "0.08 0.01 0.02", "0.05 0 0")
-        parts.joint("jaw_joint", last, "jaw", "0.03 0 0.03", axis="0 -1 0", limits=(0.0, 1.0))
+        parts.link(jaw, 0.05, "0.08 0.01 0.02", "0.05 0 0")
+        parts.joint("a_f1x", last, jaw, "0.03 0 0.03", axis="0 -1 0", limits=(0.0, 1.0))
         fingers = guess(parts, tmp_path).descriptor.fingers
-        assert fingers.links == (last, "jaw")
+        assert fingers.links == (last, jaw)
         assert fingers.max_angle == 110.0
         signed = np.array(fingers.opening_axes) * np.array(fingers.opening_signs)[:, None]
         assert signed[1] @ (0.0, 0.0, 1.0) > 0.95
@@ -380,7 +381,7 @@ class TestFingers:
         found = guess(parts, tmp_path)
         assert found.descriptor.fingers is None
         reason = next(r for r in found.reasons if r.startswith("fingers"))
-        assert "fingers=Fingers((LINK, LINK), opening_axes=(AXIS, AXIS))" in reason
+        assert "Fingers((LINK, LINK), opening_signs=(1, 1), opening_axes=(WAY, WAY))" in reason
 
 
 class TestTool:
@@ -391,6 +392,15 @@ class TestTool:
         parts.frame("ee_link", last, "0 0 0")  # where the gripper is screwed on
         parts.frame("grasptarget", last, "0.1 0 0")
         assert guess(parts, tmp_path).descriptor.tcp_link == "grasptarget"
+
+    def test_a_tcp_far_from_the_tips_is_kept_and_doubted(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.jaws(last, "a")
+        parts.frame("tcp", last, "0.2 0 0")
+        found = guess(parts, tmp_path)
+        assert found.descriptor.tcp_link == "tcp"
+        (doubt,) = (reason for reason in found.doubts if reason.startswith("TCP"))
+        assert "the finger tips meet 9 cm away, where no frame lies: tcp_offset=(-0.09" in doubt
 
     def test_finger_tips_go_before_the_flange(self, tmp_path):
         parts, last = single_arm(end="")

@@ -114,5 +114,5 @@ def test_what_is_refused(robot, tmp_path, text, error, message):
 
 def test_the_command_takes_one(robot, tmp_path, capsys):
     given = str(srdf(tmp_path, groups("a")))
-    assert main([str(robot), "--srdf", given]) == 0
+    assert main([str(robot), "--srdf", given, "--all"]) == 0
     assert "TCP: the link a_spot, as given.srdf says" in capsys.readouterr().out

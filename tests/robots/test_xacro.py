@@ -139,7 +139,8 @@ def test_the_command_takes_arguments(template, capsys):
         main([str(template), "--xacro", "prefix"])
     assert "'prefix' is not KEY=VALUE, such as prefix=left_" in capsys.readouterr().err
     pytest.importorskip("xacro")
-    assert main([str(template), "--xacro", "prefix=left_", "--xacro", "limit=2"]) == 0
+    words = ["--xacro", "prefix=left_", "--xacro", "limit=2", "--all"]
+    assert main([str(template), *words]) == 0
     assert "arm: left_shoulder, left_elbow" in capsys.readouterr().out
 
 
