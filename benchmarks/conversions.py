@@ -31,9 +31,9 @@ from parity.lockstep import Run, play
 from robot_layouts.data.playing.mode_conversion import followed, turned
 from robot_layouts.data.playing.replay import open_recording
 from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.recording import FILE
 from robot_layouts.data.recording.convert import convert
-from robot_layouts.data.reading.recording import (FILE)
-from robot_layouts.data.recording.record import (record)
+from robot_layouts.data.recording.record import record
 from robots import CONTROL_MODES, TaskError
 from tasks import get_task_class, list_clones
 

@@ -17,9 +17,8 @@ from parity.lockstep import Run, RunResult, play
 from robot_layouts.data.playing.replay import find_official
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.reading.recording import (FILE)
-from robot_layouts.data.recording.record import (record)
+from robot_layouts.data.reading.recording import FILE, Recording
+from robot_layouts.data.recording.record import record
 from robots import TaskError
 
 
