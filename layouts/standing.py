@@ -7,19 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
 from robot_layouts.core.quoting import shown
-from robot_layouts.kinematics.quaternions import yaw_quaternion
-from robot_layouts.kinematics.rotations import Floats, rotate
+from robot_layouts.kinematics.quaternions import forward, yaw_quaternion
 from robots import LayoutError, RobotDescriptor, UnknownNameError
 
 # Shares of a reach at which what is worked on lies ahead. A Panda of ManiSkill stands 0.615 m, or
 # 0.72 of its reach, behind the middle of its table; two arms of one body reach over all of it.
 ALONE, BODY = 0.72, 0.6
 SHOULDER = 0.25  # of a limb's reach; how high its first joint is above where arms of the task stand
+Point = tuple[float, float]
+
 NAME = "robot"  # of the place of one robot that serves all roles
 
 
@@ -64,15 +63,17 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
     return Layout({**layout, **changed}, layout.frames)
 
 
-def _moved(placement: Placement, robot: RobotDescriptor, middle: Floats) -> Placement:
+def _moved(placement: Placement, robot: RobotDescriptor, middle: Point) -> Placement:
     """Return a placement with another robot, as near to the middle as its reach asks for."""
     if placement.keyframe not in robot.keyframes:
         placement = replace(placement, keyframe=None)
     own = placement.robot
     if robot == own or placement.on is not None:
         return placement.with_robot(robot)
-    x, y, z = placement.base_position
-    x, y = (middle + (np.array([x, y]) - middle) * robot.reach / own.reach).round(4).tolist()
+    *flat, z = placement.base_position
+    x, y = (
+        round(m + (at - m) * robot.reach / own.reach, 4) for m, at in zip(middle, flat, strict=True)
+    )
     turned = faced(robot, placement.facing)
     return replace(placement, robot=robot, position=(x, y, z), quaternion=turned)
 
@@ -82,14 +83,15 @@ def _body(robot: RobotDescriptor, layout: Layout) -> Placement:
     roles = _roles(robot, list(layout))
     limb, role = robot.limbs[next(iter(roles.values()))], next(iter(roles))
     middle, own = _middle(layout), layout[role]
-    left = np.array(own.base_position[:2]) - middle
+    across, along = (at - m for at, m in zip(own.base_position[:2], middle, strict=True))
     if len(layout) == 1:  # then it stands behind the middle, as the task's own does
-        left = np.array([left[1], -left[0]])
-    yaw = math.atan2(-left[0], left[1])  # of what has that direction to its left
+        across, along = along, -across
+    yaw = math.atan2(-across, along)  # of what has that direction to its left
     ahead, (x, y, height) = BODY * limb.reach, limb.base
     back = x + math.sqrt(max(ahead**2 - y**2, 0.0))
-    at = middle - back * np.array([math.cos(yaw), math.sin(yaw)])
-    place = (*at.round(4).tolist(), round(own.base_position[2] + SHOULDER * limb.reach - height, 4))
+    at_x, at_y = middle[0] - back * math.cos(yaw), middle[1] - back * math.sin(yaw)
+    raised = own.base_position[2] + SHOULDER * limb.reach - height
+    place = (round(at_x, 4), round(at_y, 4), round(raised, 4))
     owners = {name: tuple(part.action_split.groups) for name, part in robot.parts.items()}
     limbs = {role: replace(robot.limbs[name], groups=owners[name]) for role, name in roles.items()}
     others = {name: part for name, part in robot.limbs.items() if name not in roles.values()}
@@ -110,11 +112,17 @@ def _roles(robot: RobotDescriptor, places: Sequence[str]) -> dict[str, str]:
     return dict(zip(places, from_left, strict=False))
 
 
-def _middle(layout: Layout) -> Floats:
-    """Return the middle of what the robots of a task's layout work on, (2,) (m)."""
-    bases = np.array([placement.base_position[:2] for placement in layout.values()])
-    if len(bases) > 1:
-        return bases.mean(axis=0)
+def _middle(layout: Layout) -> Point:
+    """Return the middle of what the robots of a task's layout work on, x and y (m)."""
+    x, y = (
+        sum(along) / len(layout)
+        for along in zip(
+            *(placement.base_position[:2] for placement in layout.values()), strict=True
+        )
+    )
+    if len(layout) > 1:
+        return x, y
     (placement,) = layout.values()
-    ahead = rotate(np.array(placement.facing), np.array([1.0, 0.0, 0.0]))[:2]
-    return bases[0] + ALONE * placement.robot.reach * ahead / max(np.linalg.norm(ahead), 1e-9)
+    ahead_x, ahead_y, _ = forward(placement.facing)
+    far = ALONE * placement.robot.reach / max(math.hypot(ahead_x, ahead_y), 1e-9)
+    return x + far * ahead_x, y + far * ahead_y

@@ -17,7 +17,6 @@ from robot_layouts.core.paths import CHECKOUT_CACHE
 
 LARGEST_FILE = 2**28  # bytes
 LARGEST_TRUSTED_FILE = 2**26  # bytes; of one whose size the manifest does not promise
-_KEPT = ("bytes", "sha256", "physics", "pictures")  # of a file, as the manifest has them
 _LARGEST_MANIFEST = 2**24  # bytes
 
 
@@ -197,7 +196,12 @@ def load_manifest() -> AssetManifest:
 def _package_to_json(package: AssetPackage) -> dict[str, Any]:
     origin = {key: value for key, value in vars(package.origin).items() if key != "name" and value}
     files = {
-        file.path: {key: getattr(file, key) for key in _KEPT}
+        file.path: {
+            "bytes": file.bytes,
+            "sha256": file.sha256,
+            "physics": list(file.physics),
+            "pictures": list(file.pictures),
+        }
         for file in sorted(package.files, key=lambda file: file.path)
     }
     undrawable = {"undrawable": list(package.undrawable)} if package.undrawable else {}
@@ -207,9 +211,15 @@ def _package_to_json(package: AssetPackage) -> dict[str, Any]:
 def _package_from_json(name: str, about: dict[str, Any]) -> AssetPackage:
     files, undrawable = about.pop("files"), tuple(about.pop("undrawable", ()))
     origin = PackageOrigin(name, **about)
-    listed = (
-        AssetFile(origin, path, size, sha256, tuple(physics), tuple(pictures))
+    listed = [
+        AssetFile(
+            origin,
+            path,
+            file["bytes"],
+            file["sha256"],
+            tuple(file["physics"]),
+            tuple(file["pictures"]),
+        )
         for path, file in sorted(files.items())
-        for size, sha256, physics, pictures in [[file[key] for key in _KEPT]]
-    )
+    ]
     return AssetPackage(origin, tuple(listed), undrawable)
