@@ -16,6 +16,7 @@ from robots import SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
 from tasks.interfaces.workers import WorkerError
 
+GONE, LEFT = [0, 1], [2, 3]  # environments of the first worker and of the second
 ACTION = np.full((4, 8), 0.2, np.float32)
 
 
@@ -32,6 +33,50 @@ def shared():
 
 def first_worker(env):
     return env._backend.workers[0].pid
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("how", ["killed", "hung"])
+def test_a_worker_that_fails_is_reported_and_replaced(shared, how):
+    reference = VectorTask("PickCube-v1", num_envs=4, num_workers=0)
+    for env in (shared, reference):
+        env.reset(seed=40, options={"reconfigure": True})
+        env.step(ACTION)
+    victim = first_worker(shared)
+    shared._backend.timeout = 30.0 if how == "killed" else 3.0
+    os.kill(victim, signal.SIGKILL if how == "killed" else signal.SIGSTOP)
+    with pytest.raises(WorkerError) as caught:
+        shared.step(ACTION)
+    shared._backend.timeout = 30.0
+    error = caught.value
+    assert error.env_ids == GONE
+    assert error.seeds == [40, 41]
+    why = "died by SIGKILL" if how == "killed" else "did not reply within 3 s and was ended"
+    assert f"worker 0 with environments [0, 1] of seeds [40, 41]: process {victim} {why}" in str(
+        error
+    )
+    assert "restart()" in str(error)
+
+    expected = reference.step(ACTION)
+    for result, wanted in zip(error.results[:4], expected[:4], strict=True):
+        np.testing.assert_array_equal(result[LEFT], wanted[LEFT])
+    with pytest.raises(WorkerError, match=r"environments \[0, 1\]"):
+        shared.step(ACTION)
+    with pytest.raises(TaskError, match=r"environments \[3\] are not gone"):
+        shared.restart({3: 5})
+
+    obs, info = shared.restart({1: 77})
+    gone = np.array([True, True, False, False])
+    wanted, _ = reference.reset(
+        seed=[40, 77, None, None], options={"reset_mask": gone, "reconfigure": True}
+    )
+    np.testing.assert_array_equal(obs, wanted)
+    assert info["elapsed_steps"].tolist() == [0, 0, 2, 2]
+    for _ in range(50):  # beyond the end of the episodes
+        for result, wanted in zip(shared.step(ACTION)[:4], reference.step(ACTION)[:4], strict=True):
+            np.testing.assert_array_equal(result, wanted)
+    assert victim not in workers()
+    assert len(workers()) == 2
 
 
 def test_after_an_interrupted_step_the_next_one_is_right(shared):
