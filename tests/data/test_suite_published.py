@@ -1,5 +1,6 @@
 """The published results of the standard suite are what their receipts say, and are played again."""
 
+import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robot_layouts.data.reading.provenance import descriptor_digest
+from robot_layouts.data.reading.provenance import describe_layout, descriptor_digest
 from robot_layouts.data.receipts import Receipt
 from robot_layouts.data.receipts.provenance import describe_expert, describe_task
 from robot_layouts.data.suite.report import read_runs, render_markdown
@@ -41,8 +42,12 @@ def test_it_was_played_by_the_code_that_is_here(path):
     task = get_task_class(receipt.task["id"])
     assert receipt.task == describe_task(task)
     assert receipt.policy == describe_expert(find_expert(task.task_id))
-    for place in receipt.making["layout"].values():
+    described = describe_layout(
+        task.layout
+    )  # also fields that descriptors had not when it was played
+    for name, place in receipt.making["layout"].items():
         assert place["descriptor"] == descriptor_digest(RobotRegistry.load(place["robot"]))
+        assert place["joint_groups"] == json.loads(json.dumps(described[name]["joint_groups"]))
 
 
 @pytest.mark.long

@@ -140,6 +140,7 @@ def _describe_group(group: JointGroup) -> dict[str, Any]:
     silent |= {"command"} if group.command == "position" else set()
     silent |= set() if group.target else {"target"}
     silent |= set() if group.leaders else {"leaders", "lead"}
+    silent |= set() if group.approximate_ik else {"approximate_ik"}
     return {name: value for name, value in asdict(group).items() if name not in silent}
 
 
