@@ -6,6 +6,7 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from robot_layouts.core.errors import AssetError, DescriptorError, closest_match
 from robot_layouts.core.importing import imported
@@ -15,6 +16,9 @@ from robots.assets.locator import LocalUrdf
 from robots.descriptor import RobotDescriptor
 from robots.mjcf.locator import ENDINGS, LocalMjcf, is_mjcf
 from robots.registry import ROBOTS, RobotRegistry, checked_robot
+
+if TYPE_CHECKING:
+    from robots.guess import Guess
 
 FORMS = (
     "a name (`robot-layouts robots list` has all), the path of a URDF or MJCF, or MODULE:NAME of"
@@ -54,15 +58,20 @@ def named_robot(word: str | os.PathLike[str]) -> RobotDescriptor:
         MissingPackageError: If it is an MJCF, and MuJoCo is not installed.
     """
     if is_path(word):
-        _expect_file(absolute(word, "the path of a robot"))
-        from robots.from_urdf import guess_descriptor
-
-        return guess_descriptor(word).descriptor
+        return guessed_robot(word).descriptor
     if isinstance(word, str) and ":" in word:
         return _of_module(word)
     if isinstance(word, str) and word not in ROBOTS:
         raise ROBOTS.unknown(word, f"A robot goes by {FORMS}.")
     return RobotRegistry.load(word)  # type: ignore[arg-type]  # which says what it takes
+
+
+def guessed_robot(path: str | os.PathLike[str]) -> Guess:
+    """Return what is guessed from a URDF or MJCF; see `named_robot` for the errors."""
+    _expect_file(absolute(path, "the path of a robot"))
+    from robots.from_urdf import guess_descriptor
+
+    return guess_descriptor(path)
 
 
 def robot_in_file(word: str, place: str, folder: Path) -> RobotDescriptor:

@@ -160,7 +160,9 @@ def _draw_robot(
     poses, every = _poses(model, qpos), range(len(model.hulls))
     view = _View(EYE)
     _draw_faces(axes, view, model, poses, _colours(model, limbs), every)
-    points = _points(model, poses, every)
+    points = np.concatenate([_points(model, poses, every), poses[:, :3, 3]])
+    if not model.hulls:
+        _draw_bones(axes, view, model, poses)
     size, lowest = float(np.ptp(points, axis=0).max()), points[:, 2].min()
     start, end = np.array([0.0, 0.0, lowest]), np.array([ARROW * size, 0.0, lowest])
     corners = [view.flat(points), _arrow(axes, view, start, end, INK, "front")]
@@ -209,6 +211,8 @@ def _opening(model: RobotModel, opened: Floats, closed: Floats) -> Floats:
     """
     middles = [np.array([*hull.corners.mean(axis=0), 1.0]) for hull in model.hulls]
     links = [hull.link for hull in model.hulls]
+    if not middles:
+        return np.array([0.0, 1.0, 0.0])
     moved = np.einsum("nij,nj->ni", (opened - closed)[links], np.array(middles))[:, :3]
     most = moved[np.linalg.norm(moved, axis=1).argmax()]
     length = float(np.linalg.norm(most))
@@ -277,6 +281,14 @@ def _points(model: RobotModel, poses: Floats, chosen: Sequence[int]) -> Floats:
     hulls = [model.hulls[i] for i in chosen]
     corners = [h.corners @ poses[h.link, :3, :3].T + poses[h.link, :3, 3] for h in hulls]
     return np.concatenate(corners) if corners else np.zeros((0, 3))
+
+
+def _draw_bones(axes: Axes, view: _View, model: RobotModel, poses: Floats) -> None:
+    """Draw a line from each link to the one that carries it: for robots without shapes."""
+    places = view.flat(poses[:, :3, 3])
+    for link, parent in enumerate(model.kinematics.parents):
+        if parent >= 0:
+            axes.plot(*places[[parent, link]].T, color=INK, linewidth=3, marker="o")
 
 
 def _draw_faces(

@@ -36,7 +36,7 @@ LABELS = {
     "collision": "Collision shapes",
 }
 
-NO_SLIDERS = "A saved page has no sliders for joints; without --html, view serves one that has."
+NO_SLIDERS = "A saved page has no sliders for joints; one that is served has."
 NOTE_STYLE = (  # above the bar that plays a motion
     "position: fixed; left: 0.75rem; bottom: 4.5rem; z-index: 1000; max-width: 24rem;"
     " padding: 0.5rem 0.75rem; border-radius: 0.25rem; background: #fffd; color: #222;"

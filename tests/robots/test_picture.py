@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from html import unescape
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
@@ -13,6 +15,7 @@ from PIL import Image
 
 from robot_layouts.simulation.checks.try_command import inspect
 from robots import DescriptorError, RobotRegistry
+from robots.named import guessed_robot
 from robots.picture import FINGER, draw, save_picture
 
 
@@ -79,3 +82,24 @@ def test_refusals_leave_no_file(tmp_path: Path) -> None:
     with pytest.raises(DescriptorError, match="one robot at a time; 2 are given"):
         inspect(["panda", "so100"], picture=str(tmp_path / "both.png"))
     assert not list(tmp_path.iterdir())
+
+
+BARE = """<robot name="bare"><link name="base"/><link name="tip"/>
+<joint name="j" type="revolute"><parent link="base"/><child link="tip"/><origin xyz="0 0 0.3"/>
+<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+
+def test_a_robot_without_shapes_is_drawn_by_its_links(tmp_path: Path) -> None:
+    (tmp_path / "bare.urdf").write_text(BARE)
+    assert inspect([str(tmp_path / "bare.urdf")], picture=str(tmp_path / "bare.png")) == 0
+    assert (tmp_path / "bare.png").exists()
+
+
+def test_what_was_guessed_with_doubt_is_written_beneath(tmp_path: Path) -> None:
+    (tmp_path / "bare.urdf").write_text(BARE)
+    guess = guessed_robot(tmp_path / "bare.urdf")
+    assert guess.doubts
+    with matplotlib.rc_context({"svg.fonttype": "none"}):
+        inspect([str(tmp_path / "bare.urdf")], picture=str(tmp_path / "bare.svg"))
+    text = unescape((tmp_path / "bare.svg").read_text())
+    assert all(doubt[:40] in text for doubt in guess.doubts)

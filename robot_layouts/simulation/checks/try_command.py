@@ -17,7 +17,7 @@ from robot_layouts.simulation.checks.trial import (
     try_robot,
 )
 from robots import inspect as reports
-from robots.named import FORMS, named_robot
+from robots.named import FORMS, guessed_robot, is_path, named_robot
 from robots.picture import save_picture
 
 if TYPE_CHECKING:
@@ -42,7 +42,8 @@ def inspect(
     Args:
         robots: The robots.
         picture: Save a picture of the robot (.png, .pdf, .svg): its limbs at rest, its front, its
-            TCP, its gripper open and closed, and what to change if something is wrong.
+            TCP, its gripper open and closed, what to change if something is wrong, and what was
+            guessed with doubt.
         try_: Stand the robots, step them and move them in physics, and print what was seen.
 
     Raises:
@@ -51,7 +52,12 @@ def inspect(
     if picture is not None:
         if len(robots) > 1:
             raise DescriptorError(f"--picture draws one robot at a time; {len(robots)} are given")
-        print(f"picture: {save_picture(named_robot(robots[0]), picture)}")
+        if is_path(robots[0]):
+            guess = guessed_robot(robots[0])
+            robot, doubts = guess.descriptor, guess.doubts
+        else:
+            robot, doubts = named_robot(robots[0]), ()
+        print(f"picture: {save_picture(robot, picture, doubts)}")
     elif not try_:
         reports.inspect(robots)
     if not try_:
