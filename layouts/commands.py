@@ -222,7 +222,7 @@ def validate(
         picture: Save a view (.png, .pdf or .svg).
 
     Raises:
-        RobotLayoutsError: If there is no such layout, or an option makes no sense.
+        RobotLayoutsError: If there is no such layout, or an option is invalid.
     """
     report = layout.layout().validate(
         targets=_targets(target), samples=samples, table=tabletop, seed=seed
@@ -277,7 +277,7 @@ def search(
         picture: Save a view (.png, .pdf or .svg).
 
     Raises:
-        RobotLayoutsError: If an option makes no sense, or no placement is found.
+        RobotLayoutsError: If an option is invalid, or no placement is found.
     """
     if sum(where is not None for where in (table, around, ceiling)) > 1:
         raise UsageError("--table, --around and --ceiling exclude each other; choose one of them")

@@ -62,7 +62,7 @@ PROBLEMS = {"native": lambda: native_problem(), "browser": lambda: browser_probl
 
 
 def optional_problem() -> str | None:
-    """Say why robots of an optional package cannot be had, or None if they can."""
+    """Say why robots of an optional package cannot be found, or None if they can."""
     from tests.catalogue import optional_problem as problem
 
     return problem()

@@ -107,7 +107,7 @@ class Cell:
 
         Raises:
             LayoutError: If the motion is of other robots, or of no moments.
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If trimesh or python-fcl is not installed.
         """

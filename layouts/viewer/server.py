@@ -43,7 +43,7 @@ class PageServer(NamedTuple):
 
 @contextmanager
 def serving(host: str, port: int, title: str) -> Generator[PageServer, None, None]:
-    """Start a viser server that lets in only whoever has its token, and stop it at the end.
+    """Start a viser server that accepts only requests with its token, and stop it at the end.
 
     Args:
         host: Address to listen at; ``0.0.0.0`` is every one of this machine's.
@@ -124,8 +124,8 @@ def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
 def _sifted(handler: Callable[..., Any], started: list[Any]) -> Callable[..., Any]:
     """Return a handler of connections that receives only messages which `fits` lets through.
 
-    And these no faster than one in `REST` seconds, so that whoever floods the page does not keep
-    this process from all else.
+    It receives at most one in `REST` seconds, so that a flood of messages does not keep this
+    process from everything else.
     """
 
     async def handle(connection: Any) -> None:
@@ -183,7 +183,7 @@ def _free_port(host: str, port: int) -> int:
     if not host:
         raise ViewerError("--host is empty; 127.0.0.1 is this machine alone, 0.0.0.0 the network")
     if not 0 <= port <= LAST_PORT:
-        raise ViewerError(f"port {port} is none; ports are 0 … {LAST_PORT}")
+        raise ViewerError(f"port {port} does not exist; ports are 0 … {LAST_PORT}")
     try:
         family, kind, protocol, _, place = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

@@ -53,7 +53,7 @@ def teleop(
         task: Task id; MODULE:ID for one of your own.
         seed: Seed of the first episode.
         out: Folder of trajectory.h5 and .json (runs/teleop/TASK).
-        policy: Policy that acts until somebody takes an arm, as for `robot-layouts evaluate`.
+        policy: Policy that acts until the user takes over an arm, as for `robot-layouts evaluate`.
         cell: The task's robots, and what varies.
         control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
         server: Where the page is served.

@@ -75,7 +75,8 @@ def record(
         cell: The task's robots, and what varies.
 
     Raises:
-        RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
+        RobotLayoutsError: If an option is invalid, or recording cannot go on; finished episodes are
+            kept.
     """
     from robot_layouts.core.processes.start import WorkerError
     from robot_layouts.core.progress import Progress
@@ -142,7 +143,7 @@ def evaluate(
         cell: The task's robots, and what varies.
 
     Raises:
-        RobotLayoutsError: If it makes no sense, or the policy fails.
+        RobotLayoutsError: If an option is invalid, or the policy fails.
     """
     from robot_layouts.core.progress import Progress
     from robot_layouts.data import evaluation

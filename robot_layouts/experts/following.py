@@ -178,8 +178,9 @@ def follow(
         What was done, and how near to the motion the robots stayed.
 
     Raises:
-        TaskError: If the motion is none for this task, see `Follower`, or for `WAIT` control steps
-            the robots do not get on: something is in the way, or the control mode cannot do it.
+        TaskError: If the motion does not fit this task, see `Follower`, or the robots make no
+            progress for `WAIT` control steps: something is in the way, or the control mode cannot
+            do it.
         UnknownNameError: If there is no such arm.
     """
     follower = Follower(task, motion, grippers)

@@ -149,7 +149,7 @@ class PostureSearch:
     def given(self, joints: Mapping[str, float], where: str) -> Posture:
         """Return a posture that is known, with the hands open, or a better one if it is no good.
 
-        It is none if links overlap in it, or with a little noise, or if a TCP is behind its limb.
+        It is no good if links overlap, in it or with a little noise, or a TCP is behind its limb.
 
         Args:
             joints: Where joints are (rad, m); the others stay where the search starts.

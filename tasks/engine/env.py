@@ -260,7 +260,7 @@ class TaskEnv(Remade):
             Observation and info of all environments.
 
         Raises:
-            TaskError: If an argument makes no sense; nothing is reset then.
+            TaskError: If an argument is invalid; nothing is reset then.
         """
         ids = checked_ids(env_ids, self.num_envs)
         seeds = checked_seeds(seed, ids)

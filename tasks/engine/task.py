@@ -53,7 +53,7 @@ class Memory(SimpleNamespace):
             if name not in vars(self) or len(env_ids) == len(rows):
                 setattr(self, name, copy(rows))
             else:
-                kept = copy(getattr(self, name))  # somebody may hold the earlier one
+                kept = copy(getattr(self, name))  # the task may still hold the earlier one
                 kept[list(env_ids)] = rows[list(env_ids)]
                 setattr(self, name, kept)
 

@@ -109,7 +109,7 @@ class Distractors(Group):
         """Refuse what cannot be drawn.
 
         Raises:
-            TaskError: If a field is not what it must be, or may draw what makes no sense.
+            TaskError: If a field is not what it must be, or may draw invalid values.
             UnknownNameError: If there is no such shape.
         """
         super().__post_init__()

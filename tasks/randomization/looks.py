@@ -123,8 +123,8 @@ class Texture(Group):
         """Refuse what cannot be drawn.
 
         Raises:
-            TaskError: If there is nothing to choose from, a field is no distribution, or may draw
-                what makes no sense.
+            TaskError: If there is nothing to choose from, a field is not a distribution, or may
+                draw invalid values.
             UnknownNameError: If there is no such pattern.
         """
         super().__post_init__()

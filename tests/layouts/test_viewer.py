@@ -86,7 +86,7 @@ def test_a_port_in_use_is_refused_with_a_way_out(capsys):
     [
         (["--host", "nowhere.invalid"], "there is no address 'nowhere.invalid'"),
         (["--host", "192.0.2.1"], "cannot listen at '192.0.2.1', port 8080"),
-        (["--port", "70000"], "port 70000 is none; ports are 0 … 65535"),
+        (["--port", "70000"], "port 70000 does not exist; ports are 0 … 65535"),
         (["--html", "cell.pdf"], "cannot save a page as 'cell.pdf'; the name must end in .html"),
     ],
 )

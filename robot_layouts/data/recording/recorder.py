@@ -366,7 +366,7 @@ class Recorder:
             RecordingError: If there is a recording already and neither ``overwrite`` nor
                 ``resume``, it is of something else or in use by another process, or the folder
                 cannot be written.
-            TaskError: If the size makes no sense.
+            TaskError: If the size is invalid.
             AssetError: If robot files cannot be found.
         """
         if not 0 < file_size < math.inf:

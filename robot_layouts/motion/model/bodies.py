@@ -105,7 +105,7 @@ class Bodies:
             table: A table's top as x_min, y_min, x_max, y_max (m), at height 0.
 
         Raises:
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             LayoutError: If two bodies have one name, obstacles have too many parts, or an argument
                 is of another type.
             MissingPackageError: If trimesh or python-fcl is not installed.
@@ -245,7 +245,7 @@ class Bodies:
 
     @cached_property
     def counted_pairs(self) -> NDArray[np.intp]:
-        """The pairs of solids that may not touch, whoever moves, (m, 2)."""
+        """The pairs of solids that may not touch, whichever of them move, (m, 2)."""
         firsts = np.cumsum([0, *(len(model.hulls) for model in self.models.values())])
         links, others = range(firsts[-1]), range(firsts[-1], len(self.solids))
         owners = np.repeat(np.arange(len(self.models)), np.diff(firsts))

@@ -67,7 +67,7 @@ def moments(motion: TimedMotion, frequency: float | None) -> Floats:
     """Return the times of the knots, or as many per second, the motion's end included, (n,) (s).
 
     Raises:
-        MotionError: If the frequency makes no sense.
+        MotionError: If the frequency is invalid.
     """
     if frequency is None:
         return motion.times

@@ -175,7 +175,7 @@ def _read_obstacle(given: _Obstacle) -> Obstacle:
 
 
 def _array(what: str, rows: Sequence[Any]) -> Floats:
-    """Return numbers as an array; where there may be no limit, null is none."""
+    """Return numbers as an array; null, where there is no limit, is infinite."""
     try:
         return np.array([np.inf if row is None else row for row in rows], float)
     except ValueError:

@@ -23,7 +23,7 @@ def motion_cell(motion: TimedMotion, title: str) -> Cell:
     """Return what a page shows of a motion.
 
     Raises:
-        AssetError: If a robot's files cannot be found or make no sense.
+        AssetError: If a robot's files cannot be found or are invalid.
         MissingPackageError: If trimesh or python-fcl is not installed.
     """
     scenes = Scenes(motion)

@@ -39,7 +39,7 @@ class Scenes:
         """Read the robots' files.
 
         Raises:
-            AssetError: If they cannot be found or make no sense.
+            AssetError: If they cannot be found or are invalid.
             MissingPackageError: If trimesh or python-fcl is not installed.
         """
         self.motion = motion

@@ -127,7 +127,7 @@ def read_targets(cell: Cell, goals: Mapping[str, Goal], start: Floats) -> tuple[
         start: Where all joints are, (D,) (rad, m).
 
     Raises:
-        MotionError: If a goal makes no sense, or two places share joints.
+        MotionError: If a goal is invalid, or two places share joints.
         NoPlanError: If a place cannot get there.
         UnknownNameError: If there is no such place.
     """

@@ -83,10 +83,10 @@ def plan(
         The motion, of all robots.
 
     Raises:
-        AssetError: If a robot's files cannot be found or make no sense.
-        LayoutError: If obstacles or the table make no sense.
+        AssetError: If a robot's files cannot be found or are invalid.
+        LayoutError: If obstacles or the table are invalid.
         MissingPackageError: If the extra ``motion`` is not installed.
-        MotionError: If another argument makes no sense.
+        MotionError: If another argument is invalid.
         NoPlanError: If there is no such motion, or none was found; ``reason`` says why.
         UnknownNameError: If there is no such place.
     """

@@ -20,7 +20,7 @@ _LONGEST = 0.5  # way of a joint in a round (rad, m)
 _STRIDE = 0.1  # way of the TCP in a round (m), until one brings it no nearer
 _SHORTER = 0.3  # times that ever after
 _NEAR_ENOUGH = 1e-4  # m; where the place is had, or no stride brings the TCP nearer
-_GAIN = 1e-5, 1e-4  # m, rad; less is none
+_GAIN = 1e-5, 1e-4  # m, rad; less counts as no gain
 _BEYOND = 1e-3  # a limit, that a joint may be sent (rad, m)
 
 

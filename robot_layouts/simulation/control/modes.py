@@ -151,7 +151,7 @@ class ModeController:
     def shortfalls(self) -> dict[str, Floats]:
         """By arm, how far the last step's joints stay from where it was sent, (N, 2) (m, rad).
 
-        Of arms alone that go as near as they get where a pose cannot be had.
+        Of arms alone that go as near as they get where a pose cannot be reached.
         """
         return {
             control.tool.arm: control.shortfalls

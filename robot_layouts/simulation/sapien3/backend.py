@@ -207,7 +207,7 @@ class SapienBackend:
     def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
         """Return which links of different arms touched since it was last asked; see `Backend`."""
         if self._arms is None:
-            raise SimulationError("nobody looks at which arms touch; call watch_arms() before")
+            raise SimulationError("contacts between arms are not watched; call watch_arms() first")
         return self._arms[self.worlds[env]].take()
 
     def touching(self) -> Flags:

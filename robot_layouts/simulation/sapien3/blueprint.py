@@ -104,8 +104,8 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
         visuals: Whether to read what pictures need.
 
     Raises:
-        AssetError: If its files cannot be found, or make no sense.
-        MissingPackageError: If a mesh cannot be read for want of a package.
+        AssetError: If its files cannot be found, or are invalid.
+        MissingPackageError: If a mesh cannot be read because a package is missing.
         UnknownNameError: If ``allowed_collisions`` or ``no_floor_contact`` names a link that the
             URDF lacks.
     """
