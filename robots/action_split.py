@@ -175,7 +175,7 @@ class JointGroup:
             return
         if not self.mimic or self.delta:
             raise DescriptorError(
-                f"only a mimic group that is driven to places has leaders; {self.joints} is not"
+                f"only a mimic group that is driven to places has leaders; {self.joints} is not one"
             )
         for joint in self.leaders:
             if joint not in self.joints:
