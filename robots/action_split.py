@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from robot_layouts.core.errors import DescriptorError, UnknownNameError, unknown_name_message
 from robot_layouts.core.schema import check, check_fields
-from robots.commands import COMMANDS, FRAMES, Command
+from robots.commands import COMMANDS, FRAMES, JointCommand
 
 JOINTS_OF_A_POSE = 6  # that an arm needs to choose place and orientation
 
@@ -243,7 +243,7 @@ class JointGroup:
         return COMMANDS[self.command].numbers(self.joints, self.unit)
 
     @property
-    def asks(self) -> Command:
+    def asks(self) -> JointCommand:
         """What the action numbers ask for."""
         return COMMANDS[self.command]
 

@@ -48,7 +48,7 @@ class RecordedCell:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell(RecordedCell):
+class CellOptions(RecordedCell):
     """Which robots stand where, and what varies.
 
     Attributes:

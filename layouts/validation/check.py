@@ -72,10 +72,10 @@ def validate(
     """Check a layout; see `layouts.Layout.validate`."""
     if not (isinstance(samples, int) and samples >= 0):
         raise LayoutError(f"samples is {samples!r}; it must be an integer of 0 or more")
-    return _Check(layout, named_targets(targets), samples, table, seed).run(workspaces)
+    return _LayoutCheck(layout, named_targets(targets), samples, table, seed).run(workspaces)
 
 
-class _Check:
+class _LayoutCheck:
     """One check of one layout, with everything loaded that it needs."""
 
     def __init__(

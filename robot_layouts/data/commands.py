@@ -19,13 +19,12 @@ from robot_layouts.data.playing.command_options import (
     stop_signals,
 )
 from robots import TaskError
-from tasks.cell_options import Cell
+from tasks.cell_options import CellOptions
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from layouts.viewer import Cell as ShownCell
-    from layouts.viewer import Motion
+    from layouts.viewer import ShownCell, ShownMotion
     from robot_layouts.data.playing.replay import Replayed
     from robot_layouts.data.reading.recording import Recording, Trajectory
     from tasks import TaskEnv
@@ -39,7 +38,7 @@ def teleop(
     seed: Seed = 0,
     out: Folder | None = None,
     policy: Policy | None = None,
-    cell: Cell,
+    cell: CellOptions,
     control_mode: ControlMode | None = None,
     server: Server,
 ) -> None:
@@ -115,7 +114,7 @@ def view_task(
     seed: int = 0,
     demo: RecordingPath | None = None,
     episode: int = 0,
-    cell: Cell,
+    cell: CellOptions,
     page: Page,
 ) -> None:
     """Look at a task, or at a demonstration of it, in a browser.
@@ -176,7 +175,7 @@ def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
         task.close()
 
 
-def _motion(task: TaskEnv, trajectory: Trajectory) -> Motion:
+def _motion(task: TaskEnv, trajectory: Trajectory) -> ShownMotion:
     """Reset the task as the episode began, and return what happens in it."""
     from robot_layouts.data.reading.json_files import TrajectoryError
     from tasks.episode import REBUILT, play

@@ -24,7 +24,7 @@ from robot_layouts.experts import find_expert
 from robot_layouts.experts.rehearsal import rehearsed
 from robots import AssetError, MissingPackageError, RecordingError, TaskError
 from tasks import TaskEnv
-from tasks.cell_options import Cell
+from tasks.cell_options import CellOptions
 from tasks.episode import PlayedEpisode, Score, play
 from tasks.registry import make_scenario
 
@@ -194,7 +194,7 @@ def demo(
     seeds: Count = 10,
     out: Folder = Path("runs/demo"),
     no_video: bool = False,
-    cell: Cell,
+    cell: CellOptions,
 ) -> int:
     """Let an expert play a task, and keep a recording, a picture and a video.
 

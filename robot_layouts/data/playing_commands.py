@@ -23,7 +23,7 @@ from robot_layouts.data.playing.command_options import (
 )
 from robot_layouts.data.reading.json_files import FILE_SIZE
 from robots import RecordingError, RobotDescriptor
-from tasks.cell_options import Cell, PlacedRobot, chosen_robots
+from tasks.cell_options import CellOptions, PlacedRobot, chosen_robots
 
 if TYPE_CHECKING:
     from robot_layouts.data.dataset.certificate import RecordingCertificate
@@ -56,7 +56,7 @@ def record(
     players: Players,
     seed: Seed = 0,
     options: RecordOptions,
-    cell: Cell,
+    cell: CellOptions,
 ) -> int:
     """Let an expert or a policy play episodes in worker processes, and record them.
 
@@ -126,7 +126,7 @@ def evaluate(
     seed: Seed = 0,
     receipt: Annotated[Path, Word("JSON")] | None = None,
     acting: Acting,
-    cell: Cell,
+    cell: CellOptions,
 ) -> None:
     """Let a policy or an expert play episodes, and print how well it does.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from layouts import Layout
 from layouts.commands import Page
-from layouts.viewer import Cell
+from layouts.viewer import ShownCell
 from robot_layouts.core.commands import LOOPBACK
 from robot_layouts.data.commands import episode_cell
 from robot_layouts.data.playing.replay import open_recording
@@ -44,7 +44,7 @@ def view(
     page = Page(host=host, port=port, html=None if html is None else fspath(html))
     if isinstance(shown, Layout):
         robots = ", ".join(f"{name} {placed.robot.name}" for name, placed in shown.items())
-        page.show(lambda: Cell(robots, shown))
+        page.show(lambda: ShownCell(robots, shown))
     elif isinstance(shown, TaskEnv):
         page.show(lambda: task_cell(shown, shown.task_id))
     elif isinstance(shown, Recording):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from robot_layouts.experts.tips import gripper_turn
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation import State
-from robot_layouts.simulation.world import Body
+from robot_layouts.simulation.world import WorldBody
 from tasks import TaskEnv
 
 OPEN, CLOSED = 1.0, -1.0
@@ -34,7 +34,7 @@ class Scene:
         self._layout = task.standing()
         world = task.simulation.worlds[0]
         self.design: Any = world.design
-        self.bodies: tuple[Body, ...] = tuple(world.bodies.values())
+        self.bodies: tuple[WorldBody, ...] = tuple(world.bodies.values())
 
     def body(self, name: str) -> Pose:
         """Return the pose of a body."""

@@ -36,7 +36,7 @@ _LONGEST_DIFFERENCE_STEP = 0.3  # of a joint, per iteration (rad)
 
 
 @dataclass(frozen=True, eq=False)
-class Goal:
+class IkGoal:
     """Where a point of a tree is to be, and how a link is to be turned, in the root's frame.
 
     Attributes:
@@ -86,7 +86,7 @@ class Solutions:
 
 
 def solve(
-    tree: Tree, goal: Goal, starts: Floats, free: Sequence[int], iterations: int = ITERATIONS
+    tree: Tree, goal: IkGoal, starts: Floats, free: Sequence[int], iterations: int = ITERATIONS
 ) -> Solutions:
     """Bring a tree to a goal by damped least squares, from every start at once.
 
@@ -107,7 +107,7 @@ def solve(
     return Solutions(qpos, missing, turn_missing, solved)
 
 
-def shortfalls(tree: Tree, goal: Goal, qpos: Floats) -> tuple[Floats, Floats]:
+def shortfalls(tree: Tree, goal: IkGoal, qpos: Floats) -> tuple[Floats, Floats]:
     """Return how far the point stays from its place, (n,) (m), and how far from its turn (rad).
 
     Args:
@@ -121,7 +121,7 @@ def shortfalls(tree: Tree, goal: Goal, qpos: Floats) -> tuple[Floats, Floats]:
 
 def approach(
     tree: Tree,
-    goal: Goal,
+    goal: IkGoal,
     qpos: Floats,
     free: Sequence[int],
     longest: Floats | float,
@@ -193,7 +193,9 @@ def _share(way: Floats, at: Floats, low: Floats, high: Floats) -> float:
     return float(np.clip(shares.min(initial=1.0), 0.0, 1.0))
 
 
-def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int], iterations: int) -> Floats:
+def _descend(
+    tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int], iterations: int
+) -> Floats:
     limits = tree.limits[free]
     rows = 3 if goal.rotation is None else 6
     damping = DAMPING**2 * np.eye(rows)
@@ -214,7 +216,7 @@ def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int], iteratio
     return qpos
 
 
-def _errors(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int]) -> tuple[Floats, Floats]:
+def _errors(tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int]) -> tuple[Floats, Floats]:
     """Return what is missing to the goal, (n, 3 or 6), and its slopes by the free coordinates."""
     poses = tree.forward(qpos)
     place = poses[:, goal.links][..., :3, 3].mean(axis=1)

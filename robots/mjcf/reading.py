@@ -85,10 +85,10 @@ def read_mjcf(path: Path) -> MjcfText:
         AssetError: If a file of it cannot be read, is no MJCF, lies outside of its folder and its
             package, or there are too many; or if it has elements that make no robot.
     """
-    return _Reading(path).text()
+    return _MjcfReading(path).text()
 
 
-class _Reading:
+class _MjcfReading:
     """One MJCF that is being read."""
 
     def __init__(self, path: Path) -> None:

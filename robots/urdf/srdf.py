@@ -101,7 +101,7 @@ def read_semantics(srdf: Path, model: UrdfModel) -> Semantics:
         UnknownNameError: If a group, a chain or a state names what does not exist.
     """
     root = parse_urdf(read_urdf(srdf), str(srdf))
-    reading = _Reading(root, model, srdf)
+    reading = _SrdfReading(root, model, srdf)
     return Semantics(
         groups={name: reading.group(name) for name in reading.elements},
         end_effectors=tuple(map(reading.end_effector, root.iterfind("end_effector"))),
@@ -110,7 +110,7 @@ def read_semantics(srdf: Path, model: UrdfModel) -> Semantics:
     )
 
 
-class _Reading:
+class _SrdfReading:
     """One SRDF that is being read."""
 
     def __init__(self, root: Element, model: UrdfModel, srdf: Path) -> None:

@@ -307,7 +307,7 @@ class JoinedFiles:
             )
 
 
-class _Part(NamedTuple):
+class _FinishedEpisode(NamedTuple):
     """A finished episode that is not joined yet: its size (bytes), and what its header says."""
 
     size: int
@@ -376,7 +376,7 @@ class Recorder:
         self.parts = self.path.with_suffix(".parts")
         self.damaged: list[str] = []
         self._header, self._limit = describe_task(task, source, source_desc), file_size * 1e6
-        self._waiting: dict[int, _Part] = {}  # by seed
+        self._waiting: dict[int, _FinishedEpisode] = {}  # by seed
         self._coming: deque[int] = deque()
         self._given_up = set[int]()
         with disk_errors(self.path):
@@ -449,7 +449,7 @@ class Recorder:
         if seed in self.seeds:
             raise RecordingError(f"{self.path} has an episode of seed {seed} already")
         write_part(self.parts, seed, part)
-        self._waiting[seed] = _Part(part_size(part), source_of(self._header))
+        self._waiting[seed] = _FinishedEpisode(part_size(part), source_of(self._header))
         while (full := self._full_file()) is not None:
             self._fill_last(full)
 
@@ -512,7 +512,7 @@ class Recorder:
         if seed_of(part) in self._files.seeds:
             part.unlink()
         else:
-            self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
+            self._waiting[seed_of(part)] = _FinishedEpisode(stored.size, source_of(header))
 
     def _full_file(self, *, certain: bool = False) -> list[int] | None:
         """Return the seeds of the next full file; None if there is not enough for one.
@@ -551,7 +551,7 @@ class Recorder:
         spilt = [seed for seed in file.episodes if seed not in set(seeds)]
         for seed, stored in self._files.read_groups(file, spilt) if spilt else ():
             write_part(self.parts, seed, encoder.encode_stored(stored), sync=True)
-            self._waiting[seed] = _Part(stored.size, source_of(header))
+            self._waiting[seed] = _FinishedEpisode(stored.size, source_of(header))
         self._write(file, seeds, last=False)
 
     def _write(self, file: OpenFile, seeds: Iterable[int], *, last: bool) -> None:

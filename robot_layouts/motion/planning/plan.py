@@ -19,10 +19,10 @@ from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.model.bodies import checked_table
 from robot_layouts.motion.model.obstacles import Held, Obstacle
 from robot_layouts.motion.motion import Motion
-from robot_layouts.motion.planning.goals import Goal, Target, read_targets
+from robot_layouts.motion.planning.goals import Goal, PlaceGoal, read_targets
 from robot_layouts.motion.planning.query import Query
 from robot_layouts.motion.planning.schedule import schedule
-from robot_layouts.motion.timing.trajectories import CellTrajectory, Trajectory, columns_of
+from robot_layouts.motion.timing.trajectories import CellTrajectory, JointTrajectory, columns_of
 from robot_layouts.motion.timing.velocities import (
     Accelerations,
     largest_accelerations,
@@ -142,7 +142,7 @@ def _progress(patience: float) -> Progress:
     return progress
 
 
-def _robots(targets: Sequence[Target], others: Mapping[str, Motion]) -> tuple[str, ...]:
+def _robots(targets: Sequence[PlaceGoal], others: Mapping[str, Motion]) -> tuple[str, ...]:
     """Return the robots that a plan moves.
 
     Raises:
@@ -170,7 +170,7 @@ def _dynamic_obstacles(cell: Cell, start: Floats, others: Mapping[str, Motion]) 
             raise MotionError(f"others[{name!r}] is {shown(motion)}; it takes a Motion")
         if name not in motion.positions or motion.layout[name].robot != robot:
             raise MotionError(f"others[{name!r}] is {motion!r}; it has no {name} that is {robot!r}")
-        trajectory = Trajectory(
+        trajectory = JointTrajectory(
             columns_of(cell, [name]),
             motion.times,
             motion.positions[name],

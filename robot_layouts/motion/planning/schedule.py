@@ -9,7 +9,7 @@ from robot_layouts.motion.planning.infeasibility import CUT_OFF
 from robot_layouts.motion.planning.query import Query
 from robot_layouts.motion.planning.space import Progress, Resolution, Space
 from robot_layouts.motion.timing.paths import Path
-from robot_layouts.motion.timing.trajectories import CellTrajectory, Trajectory
+from robot_layouts.motion.timing.trajectories import CellTrajectory, JointTrajectory
 from robot_layouts.motion.timing.velocities import STEP, timed
 
 LATER = 10 * STEP  # s; how much later a motion is tried next
@@ -100,7 +100,7 @@ def _each_alone(query: Query, ends: Floats, accelerations: Floats) -> CellTrajec
 
 
 def _one_by_one(
-    query: Query, waiting: list[tuple[str, Trajectory]]
+    query: Query, waiting: list[tuple[str, JointTrajectory]]
 ) -> tuple[CellTrajectory, int | None]:
     """Send robots off in an order; return everything over time, or who finds no moment to go."""
     scheduled = query.dynamic_obstacles
@@ -114,17 +114,17 @@ def _one_by_one(
     return scheduled, None
 
 
-def _trajectory(space: Space, path: Path, accelerations: Floats) -> Trajectory:
-    return Trajectory(space.free, *timed(path, accelerations[space.free]))
+def _trajectory(space: Space, path: Path, accelerations: Floats) -> JointTrajectory:
+    return JointTrajectory(space.free, *timed(path, accelerations[space.free]))
 
 
 def earliest_start(
     known: CellTrajectory,
-    trajectory: Trajectory,
+    trajectory: JointTrajectory,
     checker: Checker,
     resolution: Resolution,
     progress: Progress,
-) -> Trajectory | None:
+) -> JointTrajectory | None:
     """Return a trajectory delayed until it collides with nothing, or None.
 
     Args:

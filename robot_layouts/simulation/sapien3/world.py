@@ -20,7 +20,7 @@ from robot_layouts.simulation.sapien3.robot import SimulatedRobot
 from robot_layouts.simulation.scene.looks import AS_DECLARED
 from robot_layouts.simulation.scene.parts import Part
 from robot_layouts.simulation.scene.shapes import Shape
-from robot_layouts.simulation.world import Body, World
+from robot_layouts.simulation.world import World, WorldBody
 from robots import SimulationError
 
 
@@ -61,7 +61,7 @@ class BuiltBody(NamedTuple):
         start_pose: Pose it was built at.
     """
 
-    declared: Body
+    declared: WorldBody
     entity: sapien.Entity
     component: Any
     start_pose: sapien.Pose
@@ -136,7 +136,7 @@ class BuiltWorld:
         self.looks = AS_DECLARED
         self.studio: Any = None  # as long as this world lives, also in a fork
 
-    def add(self, body: Body) -> BuiltBody:
+    def add(self, body: WorldBody) -> BuiltBody:
         """Build a body."""
         builder = self.scene.create_actor_builder()
         for shape in body.shapes:
@@ -225,7 +225,7 @@ def build_world(world: World, blueprints: dict[str, Blueprint]) -> BuiltWorld:
     return built
 
 
-def _on_its_place(body: Body, component: Any, pose: sapien.Pose) -> sapien.Pose:
+def _on_its_place(body: WorldBody, component: Any, pose: sapien.Pose) -> sapien.Pose:
     """Return a pose at which a body that stands at ``pose`` has its lowest point as declared."""
     if not component.collision_shapes:
         return pose
