@@ -41,7 +41,7 @@ def motion_cell(motion: TimedMotion, title: str) -> ShownCell:
         poses[held.obstacle.name] = rows
     if motion.table is not None:
         things["(table)"] = Thing((_slab(*motion.table),), np.eye(7)[3])
-    own = ShownMotion(float(times[1]), motion.sample(times), poses, name="ShownMotion")
+    own = ShownMotion(float(times[1]), motion.sample(times), poses, name="Motion")
     return ShownCell(title, motion.layout, things, own, ways=_ways(scenes), hidden=HIDDEN)
 
 
