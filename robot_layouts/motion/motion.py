@@ -279,7 +279,7 @@ class Motion:
             MotionError: If the frequency is invalid.
             UnwritableFileError: If a file is there already, or cannot be written.
         """
-        from robot_layouts.motion.output.export import to_csv
+        from robot_layouts.motion.output.files import to_csv
 
         return to_csv(self, folder, frequency)
 
@@ -301,7 +301,7 @@ class Motion:
             MotionError: If the frequency is invalid.
             UnwritableFileError: If a file is there already, or cannot be written.
         """
-        from robot_layouts.motion.output.export import to_ros2
+        from robot_layouts.motion.output.files import to_ros2
 
         return to_ros2(self, folder, frequency)
 

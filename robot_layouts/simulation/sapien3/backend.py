@@ -30,8 +30,7 @@ from robot_layouts.simulation.sapien3.contacts import (
     presses_on_object,
 )
 from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
-from robot_layouts.simulation.sapien3.varied import vary
-from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world
+from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world, vary
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.world import Placements, World
