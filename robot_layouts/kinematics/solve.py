@@ -101,7 +101,7 @@ def solve(
     links = [needed.link(tree.links[link]) for link in goal.links]
     turned = needed.link(tree.links[goal.turned])
     goal = replace(goal, links=links, turned=turned)
-    qpos = _descend(needed, goal, starts.copy(), free, iterations)
+    qpos = _solved(needed, goal, starts.copy(), free, iterations)
     missing, turn_missing = shortfalls(needed, goal, qpos)
     solved = (missing < NEAR_ENOUGH[0]) & (turn_missing < NEAR_ENOUGH[1])
     return Solutions(qpos, missing, turn_missing, solved)
@@ -193,9 +193,7 @@ def _share(way: Floats, at: Floats, low: Floats, high: Floats) -> float:
     return float(np.clip(shares.min(initial=1.0), 0.0, 1.0))
 
 
-def _descend(
-    tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int], iterations: int
-) -> Floats:
+def _solved(tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int], iterations: int) -> Floats:
     limits = tree.limits[free]
     rows = 3 if goal.rotation is None else 6
     damping = DAMPING**2 * np.eye(rows)

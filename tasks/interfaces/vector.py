@@ -141,10 +141,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._everywhere = np.ones(num_envs, bool)
         self.batch_size = _checked_batch_size(batch_size, num_envs)
         parts = [
-            [
-                BatchPart(cls, scenario, ids.start, ids.stop, mode, ignore_terminations)
-                for ids in own
-            ]
+            [BatchPart(cls, scenario, i.start, i.stop, mode, ignore_terminations) for i in own]
             for own in partition(num_envs, workers, self.batch_size)
         ]
         for placement in layout.values():  # fetched here, not by all workers at once

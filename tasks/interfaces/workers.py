@@ -399,10 +399,8 @@ class Workers:
 
     def error(self, failures: Sequence[Failure]) -> VectorWorkerError:
         """Return what to raise for workers that are gone."""
-        hint = "restart() replaces what is gone; the other environments are untouched"
-        return VectorWorkerError(
-            failures, self._seeds, hint if self._made else "no vector was made"
-        )
+        way = "restart() replaces what is gone; the other environments are untouched"
+        return VectorWorkerError(failures, self._seeds, way if self._made else "no vector was made")
 
     def _handle(self, number: int, reply: Reply) -> Failure | None:
         """Note what a worker replied; returns a failure if it can go on no more.

@@ -93,11 +93,9 @@ def _by_name(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     return {name: (name,) for name in names}
 
 
-def _parts(
-    simulation: Simulation, takes: Callable[[WorldBody], bool]
-) -> dict[str, tuple[Part, ...]]:
+def _parts(simulation: Simulation, fit: Callable[[WorldBody], bool]) -> dict[str, tuple[Part, ...]]:
     """Return some bodies, the links of each robot, and each of these by itself."""
-    bodies = [body.name for body in simulation.worlds[0].bodies.values() if takes(body)]
+    bodies = [body.name for body in simulation.worlds[0].bodies.values() if fit(body)]
     links = {
         robot: tuple(Part(robot, link) for link in simulation.index.robots[robot].links)
         for robot in simulation.layout
