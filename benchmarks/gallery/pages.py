@@ -243,7 +243,7 @@ def all_pages(record: Record, folder: Path) -> dict[str, str]:
 
 
 def complaints(record: Record, folder: Path) -> Iterator[str]:
-    """Yield what is stale or missing, and the command that mends it.
+    """Yield what is stale or missing, and the command that fixes it.
 
     Raises:
         RecordError: If the record lacks a task or a robot.

@@ -147,7 +147,7 @@ class _LayoutCheck:
         for name, error in self._unread.items():
             what = f"{name} cannot be checked: {error}"
             advice = (
-                f"mend the files or the descriptor of {self._layout[name].robot.name}; the others"
+                f"fix the files or the descriptor of {self._layout[name].robot.name}; the others"
                 f" are checked as if {name} were not there"
             )
             yield Finding("files", True, (name,), (), 0.0, "m", what, advice)

@@ -19,7 +19,7 @@ from robots import MissingPackageError, RobotLayoutsError
 LAST_PORT = 65535
 PROBE_SECONDS = 10.0
 REST = 0.002  # s between two messages of a browser, which sends 120 in a second of dragging
-# What strangers send makes no lines on the terminal; who wants them adds a handler.
+# Requests without the token are not logged on the terminal; to see them, add a handler.
 LOG = logging.getLogger(__name__)
 LOG.addHandler(logging.NullHandler())
 _STARTING = threading.Lock()
@@ -53,7 +53,7 @@ def serving(host: str, port: int, title: str) -> Generator[PageServer, None, Non
     Raises:
         MissingPackageError: If viser is not installed.
         ViewerError: If the port is in use, the address is none of this machine's, or this version
-            of viser would let in anybody.
+            of viser would accept any client.
     """
     viser = import_viser()
     port = _free_port(host, port)
@@ -145,7 +145,7 @@ def _sifted(handler: Callable[..., Any], started: list[Any]) -> Callable[..., An
 
 
 def _check_guarded(server: Any, host: str, port: int) -> None:
-    """Ask the server for the page and for a WebSocket as a stranger would.
+    """Ask the server for the page and for a WebSocket, without the token.
 
     Raises:
         ViewerError: If it does not refuse both.
@@ -161,7 +161,7 @@ def _check_guarded(server: Any, host: str, port: int) -> None:
     answers = {_status(host, port, headers) for headers in ({}, upgrade)}
     if answers != {403} or not hasattr(server.gui, "_gui_input_handle_from_uuid"):
         raise ViewerError(
-            f"viser {viser.__version__} would let in anybody who asks, so no page is served:"
+            f"viser {viser.__version__} would accept any client, so no page is served:"
             " pip install 'viser>=1.1.1,<1.2'"
         )
 

@@ -247,7 +247,7 @@ def _stuck(layout: Layout, follower: Follower, came: Floats, contacts: Iterable[
     )
     joint = layout[name].robot.joints[int(missing.argmax()) - places.start]
     return (
-        f"the robots do not get on at {follower.time:.2f} s of {follower.motion.duration:.2f} s:"
+        f"the robots make no progress at {follower.time:.2f} s of {follower.motion.duration:.2f} s:"
         f" {name}'s {joint} is {missing.max():.3g} (rad or m) from where it should be"
         + "".join(f"; {contact}" for contact in deepest(contacts, than=0.0)[:1])
     )

@@ -166,7 +166,7 @@ def approach(
 
 
 def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> tuple[Floats, Floats]:
-    """Return the way that mends the place; and one that mends what else it can, a bit homeward."""
+    """Return the step that corrects the position, and one that corrects the rest, bent homeward."""
     free = np.eye(slopes.shape[1])
     way = _back(slopes[:3], _PLACE_DAMPING) @ errors[:3]
     spare = free - _back(slopes[:3], _NO_DAMPING) @ slopes[:3]
@@ -177,7 +177,7 @@ def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> tuple[Floa
 
 
 def _back(slopes: Floats, damping: float) -> Floats:
-    """Return what turns errors into the way that mends them by damped least squares."""
+    """Return the damped least-squares matrix that turns errors into the step that corrects them."""
     return slopes.T @ np.linalg.inv(slopes @ slopes.T + damping**2 * np.eye(len(slopes)))
 
 

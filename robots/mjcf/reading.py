@@ -256,7 +256,7 @@ def without_log() -> Generator[None]:
 
 
 def compiled(text: MjcfText, path: Path) -> tuple[Model, tuple[str, ...]]:
-    """Return the model that MuJoCo makes of an MJCF, and what was mended in it.
+    """Return the model that MuJoCo makes of an MJCF, and what was repaired in it.
 
     Args:
         text: The MJCF.

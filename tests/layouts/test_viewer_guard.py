@@ -235,7 +235,7 @@ def test_a_viser_that_cannot_be_guarded_is_not_served(monkeypatch):
     )
     monkeypatch.setattr(viser_infra, "websockets", changed)
     with (
-        pytest.raises(ViewerError, match=r"viser .* would let in anybody who asks, so no page is"),
+        pytest.raises(ViewerError, match=r"viser .* would accept any client, so no page is"),
         serving("127.0.0.1", 0, "cell"),
     ):
         pytest.fail("it is served")

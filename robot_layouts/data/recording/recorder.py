@@ -77,7 +77,7 @@ class OpenFile:
         episodes: Its episodes by seed, ascending.
         sources: What its header says of its source, unless it is empty.
         lost: Seeds of episodes that it held, and that are damaged.
-        whole: Whether there is nothing to mend in the h5 file.
+        whole: Whether there is nothing to repair in the h5 file.
     """
 
     number: int
@@ -96,7 +96,7 @@ class JoinedFiles:
         manifest: Where the manifest is.
         paths: The h5 files that are there, or that the manifest lists, the first one first.
         last: The last file.
-        mending: Full files of which episodes are damaged, by number.
+        to_repair: Full files of which episodes are damaged, by number.
         seeds: Seeds of the episodes of all files.
         damaged: What is damaged, in words.
     """
@@ -115,7 +115,7 @@ class JoinedFiles:
         self._entries: list[FileEntry] = []  # of the full files
         self._last_entry: FileEntry | None = None
         self.last = OpenFile(0)
-        self.mending: dict[int, OpenFile] = {}
+        self.to_repair: dict[int, OpenFile] = {}
         self.seeds = set[int]()
         self.damaged: list[str] = []
         self._listed = self._read_manifest()
@@ -288,7 +288,7 @@ class JoinedFiles:
             )
         file = self._read_all(number, path, entry)
         if entry is not None and file.lost:
-            self.mending[number] = file
+            self.to_repair[number] = file
             self._entries.append(entry)
         else:
             self.write(file, {s: held.group for s, held in file.episodes.items()}, last=False)
@@ -520,7 +520,7 @@ class Recorder:
         Args:
             certain: Whether not to wait for those that are expected before.
         """
-        lost = {seed for file in self._files.mending.values() for seed in file.lost}
+        lost = {seed for file in self._files.to_repair.values() for seed in file.lost}
         sizes = {seed: held.size for seed, held in self._files.last.episodes.items()}
         sizes |= {seed: part.size for seed, part in self._waiting.items() if seed not in lost}
         if sum(sizes.values()) <= self._limit:
@@ -566,7 +566,7 @@ class Recorder:
             self._waiting.pop(seed, None)
 
     def _join(self) -> None:
-        for file in self._files.mending.values():
+        for file in self._files.to_repair.values():
             if again := file.lost & self._waiting.keys():
                 self._write(file, {*file.episodes, *again}, last=False)
         waiting = sum(part.size for part in self._waiting.values())

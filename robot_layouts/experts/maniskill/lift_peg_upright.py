@@ -23,7 +23,7 @@ CORRECTIONS = 10  # of where the held end goes, once it is nearly up
 
 
 @dataclass(frozen=True)
-class UprightStyle:
+class Style:
     """How the peg is stood up.
 
     Attributes:
@@ -43,12 +43,12 @@ class UprightStyle:
 
 
 STYLES = (
-    UprightStyle(),
-    UprightStyle(shift=0.1),
-    UprightStyle(shift=0.1, tilt=0.0),
-    UprightStyle(tilt=0.0, upright_tilt=0.0),
-    UprightStyle(end=-1, tilt=0.0, upright_tilt=0.0),
-    UprightStyle(end=-1, tilt=0.0, upright_tilt=0.0, shift=0.1),
+    Style(),
+    Style(shift=0.1),
+    Style(shift=0.1, tilt=0.0),
+    Style(tilt=0.0, upright_tilt=0.0),
+    Style(end=-1, tilt=0.0, upright_tilt=0.0),
+    Style(end=-1, tilt=0.0, upright_tilt=0.0, shift=0.1),
 )
 
 
@@ -71,7 +71,7 @@ def stand_up(task: TaskEnv, seed: int) -> NDArray[np.float32]:
 class _StandUp:
     """One way to stand the peg up, worked out from how it lies."""
 
-    def __init__(self, style: UprightStyle, scene: Scene) -> None:
+    def __init__(self, style: Style, scene: Scene) -> None:
         self.style = style
         self.middle, quaternion = scene.body(PEG)
         axis = rotate(quaternion, _PEG_AXIS)

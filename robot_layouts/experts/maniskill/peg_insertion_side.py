@@ -27,7 +27,7 @@ STROKE = 0.01  # m; between waypoints along the hole's axis: joints move on arcs
 
 
 @dataclass(frozen=True)
-class InsertionStyle:
+class Style:
     """How the peg is held.
 
     Attributes:
@@ -45,13 +45,13 @@ class InsertionStyle:
 
 # Tried in this order. The first solves 96 % of seeds 0 … 449.
 STYLES = (
-    InsertionStyle(),
-    InsertionStyle(tilt=radians(15)),
-    InsertionStyle(behind=0.05),  # for pegs whose tail is out of reach
-    InsertionStyle(turned=True),
-    InsertionStyle(tilt=radians(30)),
-    InsertionStyle(tilt=radians(15), turned=True),
-    InsertionStyle(pulled=0.1),
+    Style(),
+    Style(tilt=radians(15)),
+    Style(behind=0.05),  # for pegs whose tail is out of reach
+    Style(turned=True),
+    Style(tilt=radians(30)),
+    Style(tilt=radians(15), turned=True),
+    Style(pulled=0.1),
 )
 
 
@@ -78,7 +78,7 @@ def insert_peg(task: TaskEnv, seed: int) -> NDArray[np.float32]:
 class _Insertion:
     """One way for an arm at ``base`` (m) to insert a peg of one design."""
 
-    def __init__(self, style: InsertionStyle, design: PegDesign, base: Floats) -> None:
+    def __init__(self, style: Style, design: PegDesign, base: Floats) -> None:
         self.style, self.design, self.base = style, design, base
 
     def script(self) -> Script:

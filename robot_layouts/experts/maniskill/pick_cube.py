@@ -17,7 +17,7 @@ ARM, CUBE, GOAL = "arm", "cube", "goal_site"
 
 
 @dataclass(frozen=True)
-class PickStyle:
+class Style:
     """How the cube is picked and carried.
 
     Attributes:
@@ -36,9 +36,9 @@ LEANS = tuple(map(radians, (0, -20, -40, 20, 40)))
 
 # Tried in this order. The first solves each of the seeds 0 … 99.
 STYLES = (
-    PickStyle(),
-    PickStyle(yaws=(0.0, -0.3, 0.3, -0.6, 0.6)),
-    PickStyle(above=0.08, ready=0.05),
+    Style(),
+    Style(yaws=(0.0, -0.3, 0.3, -0.6, 0.6)),
+    Style(above=0.08, ready=0.05),
 )
 
 
@@ -56,7 +56,7 @@ def pick_cube(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     return first_success(task, seed, lambda scene: [_script(style) for style in STYLES])
 
 
-def _script(style: PickStyle) -> Script:
+def _script(style: Style) -> Script:
     def carry(scene: Scene) -> list[Pose]:
         return held_at(scene, ARM, CUBE, scene.body(GOAL)[0], style.yaws, LEANS)
 

@@ -35,7 +35,7 @@ JAW_STEP = 0.08  # of the moving jaw, for an action number of 1 (rad per control
 
 
 @dataclass(frozen=True)
-class SO100Style:
+class Style:
     """How the cube is picked.
 
     Attributes:
@@ -63,8 +63,8 @@ class SO100Style:
     short: float = 0.011
 
 
-_BASE = SO100Style()
-_QUICK = SO100Style(deep=-0.096, shut=0.6, near=0.03, close=-0.7, steps=1, hold=0.01, short=0.004)
+_BASE = Style()
+_QUICK = Style(deep=-0.096, shut=0.6, near=0.03, close=-0.7, steps=1, hold=0.01, short=0.004)
 
 # Tried in this order. The first solves 52 of 100 seeds, the first two 72.
 STYLES = (
@@ -120,7 +120,7 @@ def pick_small_cube(task: TaskEnv, seed: int) -> NDArray[np.float32]:
 class _Pick:
     """One pick: where the arm's joints go, worked out from the first scene."""
 
-    def __init__(self, style: SO100Style, reach: PointSolver, scene: Scene) -> None:
+    def __init__(self, style: Style, reach: PointSolver, scene: Scene) -> None:
         self.style, self.reach = style, reach
         self.cube, quaternion = scene.body(CUBE)
         self.goal, _ = scene.body(GOAL)

@@ -24,7 +24,7 @@ STROKE = 0.003  # m; between waypoints along the way in
 
 
 @dataclass(frozen=True)
-class PlugStyle:
+class Style:
     """How the charger is held.
 
     Attributes:
@@ -40,12 +40,12 @@ class PlugStyle:
 
 # Tried in this order. The first solves 47 of the seeds 0 … 49, the second the others.
 STYLES = (
-    PlugStyle(),
-    PlugStyle(tilt=radians(15)),
-    PlugStyle(behind=0.02),
-    PlugStyle(behind=0.02, tilt=radians(15)),
-    PlugStyle(tilt=radians(30)),
-    PlugStyle(turned=True),
+    Style(),
+    Style(tilt=radians(15)),
+    Style(behind=0.02),
+    Style(behind=0.02, tilt=radians(15)),
+    Style(tilt=radians(30)),
+    Style(turned=True),
 )
 
 
@@ -66,7 +66,7 @@ def plug_in(task: TaskEnv, seed: int) -> NDArray[np.float32]:
 class _Plugging:
     """One way to plug the charger in."""
 
-    def __init__(self, style: PlugStyle) -> None:
+    def __init__(self, style: Style) -> None:
         self.style = style
 
     def script(self) -> Script:

@@ -22,7 +22,7 @@ LIFT = 0.005  # of the peg over the table while it moves (m)
 
 
 @dataclass(frozen=True)
-class PokeStyle:
+class Style:
     """How the cube is poked.
 
     Attributes:
@@ -39,13 +39,13 @@ class PokeStyle:
 
 
 STYLES = (
-    PokeStyle(),
-    PokeStyle(tilt=radians(15)),
-    PokeStyle(along=0.08),
-    PokeStyle(along=0.08, tilt=radians(15)),
-    PokeStyle(tilt=radians(30)),
-    PokeStyle(gap=0.01),
-    PokeStyle(short=0.0),
+    Style(),
+    Style(tilt=radians(15)),
+    Style(along=0.08),
+    Style(along=0.08, tilt=radians(15)),
+    Style(tilt=radians(30)),
+    Style(gap=0.01),
+    Style(short=0.0),
 )
 
 
@@ -68,7 +68,7 @@ def poke(task: TaskEnv, seed: int) -> NDArray[np.float32]:
 class _Poke:
     """One poke, worked out from where cube and target are at first."""
 
-    def __init__(self, style: PokeStyle, scene: Scene) -> None:
+    def __init__(self, style: Style, scene: Scene) -> None:
         self.style = style
         self.cube, self.target = scene.body(CUBE)[0], scene.body(TARGET)[0]
         self.direction = heading(self.cube, self.target)

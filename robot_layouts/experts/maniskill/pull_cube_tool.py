@@ -39,7 +39,7 @@ CLEARANCE = 0.05  # between the tool and the cube's middle while the tool turns 
 
 
 @dataclass(frozen=True)
-class PullStyle:
+class Style:
     """How the cube is pulled.
 
     Attributes:
@@ -56,15 +56,15 @@ class PullStyle:
 
 
 STYLES = (
-    PullStyle(),
-    PullStyle(gap=0.005, along=0.04, tilt=radians(10)),
-    PullStyle(gap=0.0, along=0.04, tilt=radians(10)),
-    PullStyle(gap=0.02),
-    PullStyle(gap=0.005),
-    PullStyle(gap=0.0),
-    PullStyle(gap=0.005, swing=radians(7)),
-    PullStyle(tilt=radians(15)),
-    PullStyle(swing=radians(10)),
+    Style(),
+    Style(gap=0.005, along=0.04, tilt=radians(10)),
+    Style(gap=0.0, along=0.04, tilt=radians(10)),
+    Style(gap=0.02),
+    Style(gap=0.005),
+    Style(gap=0.0),
+    Style(gap=0.005, swing=radians(7)),
+    Style(tilt=radians(15)),
+    Style(swing=radians(10)),
 )
 
 
@@ -91,7 +91,7 @@ class _Pull:
     from there about the base. Distances are those of the handle's end from the base.
     """
 
-    def __init__(self, style: PullStyle, base: Floats) -> None:
+    def __init__(self, style: Style, base: Floats) -> None:
         self.style, self.base = style, base
         # from the handle's end to the cube's middle, when the hook is behind it
         self.inside = HANDLE_LENGTH - HOOK_LENGTH - CUBE_HALF_SIZE - style.gap

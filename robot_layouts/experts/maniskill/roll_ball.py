@@ -29,7 +29,7 @@ MISSED = 0.1  # a ball that came less far was not hit (m)
 
 
 @dataclass(frozen=True)
-class RollStyle:
+class Style:
     """How the ball is hit.
 
     Attributes:
@@ -45,13 +45,13 @@ class RollStyle:
 
 
 STYLES = (
-    RollStyle(),
-    RollStyle(tilt=0.0),
-    RollStyle(tilt=radians(-30)),
-    RollStyle(gap=0.06),
-    RollStyle(gap=0.08),
-    RollStyle(tilt=radians(-30), gap=0.06),
-    RollStyle(tilt=0.0, gap=0.06),
+    Style(),
+    Style(tilt=0.0),
+    Style(tilt=radians(-30)),
+    Style(gap=0.06),
+    Style(gap=0.08),
+    Style(tilt=radians(-30), gap=0.06),
+    Style(tilt=0.0, gap=0.06),
 )
 
 
@@ -89,7 +89,7 @@ def _shots(rehearsal: Rehearsal, seed: int) -> Iterator[Attempt]:
 class _Shot:
     """One swing, worked out from where ball and target are."""
 
-    def __init__(self, style: RollStyle, kinematics: PoseSolver, scene: Scene, aim: float) -> None:
+    def __init__(self, style: Style, kinematics: PoseSolver, scene: Scene, aim: float) -> None:
         self.style, self.kinematics = style, kinematics
         self.ball, target = scene.body(BALL)[0], scene.body(TARGET)[0]
         self.direction = heading(self.ball, target) + aim

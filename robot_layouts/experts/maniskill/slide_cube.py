@@ -24,7 +24,7 @@ LEANS = np.radians((0, 20, 40))
 
 
 @dataclass(frozen=True)
-class SlideStyle:
+class Style:
     """How the gripper slides the cube.
 
     Attributes:
@@ -38,7 +38,7 @@ class SlideStyle:
     legs: int = 3
 
 
-STYLES = (SlideStyle(), SlideStyle(gap=0.06), SlideStyle(height=0.03), SlideStyle(gap=0.06, legs=6))
+STYLES = (Style(), Style(gap=0.06), Style(height=0.03), Style(gap=0.06, legs=6))
 
 
 def slide(task: TaskEnv, seed: int) -> NDArray[np.float32]:
@@ -57,7 +57,7 @@ def slide(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     return first_success(task, seed, lambda scene: [_script(style, scene) for style in STYLES])
 
 
-def _script(style: SlideStyle, scene: Scene) -> Script:
+def _script(style: Style, scene: Scene) -> Script:
     cube, target = scene.body(CUBE)[0], scene.body(TARGET)[0]
     way = np.array([*(target - cube)[:2], 0.0])
     start = cube - style.gap * way / np.linalg.norm(way)

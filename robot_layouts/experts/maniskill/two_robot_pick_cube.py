@@ -27,7 +27,7 @@ GIVER, TAKER, CUBE, GOAL = "left", "right", "cube", "goal_site"
 
 
 @dataclass(frozen=True)
-class HandOverStyle:
+class Style:
     """How the cube changes hands.
 
     Both grippers hold it by the same two faces, each by its own half: they lean towards each
@@ -58,23 +58,23 @@ CARRY_LEANS = np.radians((0, -15, -30, -45, -60, 15, 30))
 
 # Tried in this order. The first solves every seed of the default layout.
 STYLES = (
-    HandOverStyle(),
-    HandOverStyle(height=0.3),
-    HandOverStyle(height=0.15),
-    HandOverStyle(beyond=0.04),
-    HandOverStyle(beyond=-0.04),
-    HandOverStyle(pick_tilt=0.0, give_tilt=radians(40), take_tilt=radians(50)),
-    HandOverStyle(pick_tilt=0.0, height=0.3, give_tilt=radians(50), take_tilt=radians(40)),
+    Style(),
+    Style(height=0.3),
+    Style(height=0.15),
+    Style(beyond=0.04),
+    Style(beyond=-0.04),
+    Style(pick_tilt=0.0, give_tilt=radians(40), take_tilt=radians(50)),
+    Style(pick_tilt=0.0, height=0.3, give_tilt=radians(50), take_tilt=radians(40)),
     *(
-        HandOverStyle(pick_tilt=0.0, give_tilt=lean, take_tilt=lean, height=height, any_side=True)
+        Style(pick_tilt=0.0, give_tilt=lean, take_tilt=lean, height=height, any_side=True)
         for height in (0.22, 0.3, 0.36, 0.15)
         for lean in (radians(60), radians(75))
     ),
     # Wide pads touch each other unless each gripper holds less of the cube.
-    HandOverStyle(half=0.018),
-    HandOverStyle(half=0.018, give_tilt=radians(60), take_tilt=radians(30)),
+    Style(half=0.018),
+    Style(half=0.018, give_tilt=radians(60), take_tilt=radians(30)),
     *(
-        HandOverStyle(
+        Style(
             half=half,
             pick_tilt=radians(30),
             give_tilt=radians(30),
@@ -109,7 +109,7 @@ def hand_over(task: TaskEnv, seed: int) -> NDArray[np.float32]:
 class _HandOver:
     """One hand-over between two bases: where each gripper goes, worked out from the scene."""
 
-    def __init__(self, style: HandOverStyle, giver_base: Floats, taker_base: Floats) -> None:
+    def __init__(self, style: Style, giver_base: Floats, taker_base: Floats) -> None:
         self.style = style
         self.forward = heading(giver_base, taker_base)
         self.ahead = np.array([np.cos(self.forward), np.sin(self.forward), 0.0])

@@ -38,7 +38,7 @@ RISES = (0.1, 0.05, 0.0)  # how far an arm may rise when it makes room (m)
 
 
 @dataclass(frozen=True)
-class TwoArmStackStyle:
+class Style:
     """How the green cube travels.
 
     Attributes:
@@ -67,18 +67,18 @@ class TwoArmStackStyle:
 
 # Tried in this order. The first solves each of the seeds 0 … 99.
 STYLES = (
-    TwoArmStackStyle(),
-    TwoArmStackStyle(tilt=radians(30)),
-    TwoArmStackStyle(short=0.04),
-    TwoArmStackStyle(tilt=radians(30), short=0.04, clearance=0.04),
-    TwoArmStackStyle(tilt=radians(10)),
-    TwoArmStackStyle(tilt=None),
-    TwoArmStackStyle(tilt=None, clearance=0.04),
-    TwoArmStackStyle(tilt=None, aside=0.4),
-    TwoArmStackStyle(tilt=None, aside=0.4, late=True),
-    TwoArmStackStyle(tilt=None, aside=0.7),
-    TwoArmStackStyle(tilt=None, aside=0.7, late=True),
-    TwoArmStackStyle(tilt=radians(10), short=0.03, aside=0.4, ready=0.03),
+    Style(),
+    Style(tilt=radians(30)),
+    Style(short=0.04),
+    Style(tilt=radians(30), short=0.04, clearance=0.04),
+    Style(tilt=radians(10)),
+    Style(tilt=None),
+    Style(tilt=None, clearance=0.04),
+    Style(tilt=None, aside=0.4),
+    Style(tilt=None, aside=0.4, late=True),
+    Style(tilt=None, aside=0.7),
+    Style(tilt=None, aside=0.7, late=True),
+    Style(tilt=radians(10), short=0.03, aside=0.4, ready=0.03),
 )
 
 
@@ -103,7 +103,7 @@ def stack_for_two(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     )
 
 
-def _lay(task: TaskEnv, style: TwoArmStackStyle, first: Scene) -> tuple[Waypoint, ...]:
+def _lay(task: TaskEnv, style: Style, first: Scene) -> tuple[Waypoint, ...]:
     """The right arm brings the green cube and makes room."""
     base, other = first.base(LAYER), first.base(STACKER)
     at_target = partial(_at_target, style=style, base=base)
@@ -141,7 +141,7 @@ def _lay(task: TaskEnv, style: TwoArmStackStyle, first: Scene) -> tuple[Waypoint
     )
 
 
-def _stack(task: TaskEnv, style: TwoArmStackStyle, first: Scene) -> tuple[Waypoint, ...]:
+def _stack(task: TaskEnv, style: Style, first: Scene) -> tuple[Waypoint, ...]:
     """The left arm picks the blue cube, waits, and lays it on the green one."""
     base, other = first.base(STACKER), first.base(LAYER)
 
@@ -194,7 +194,7 @@ def _stack(task: TaskEnv, style: TwoArmStackStyle, first: Scene) -> tuple[Waypoi
     )
 
 
-def _at_target(scene: Scene, style: TwoArmStackStyle, base: Floats) -> Floats:
+def _at_target(scene: Scene, style: Style, base: Floats) -> Floats:
     """Return where the green cube is to lie, (3,) (m)."""
     target, _ = scene.body(TARGET)
     x, y, _ = target - style.short * _level(target - base)

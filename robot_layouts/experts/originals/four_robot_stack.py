@@ -32,7 +32,7 @@ IN_PLACE = 0.012  # how near to its place a cube is let go (m)
 
 
 @dataclass(frozen=True)
-class FourArmStackStyle:
+class Style:
     """How the cubes are stacked.
 
     Attributes:
@@ -56,18 +56,18 @@ class FourArmStackStyle:
 
 
 STYLES = (
-    FourArmStackStyle(),
-    FourArmStackStyle(turn="retreat", ready=0.03),
-    FourArmStackStyle(ready=0.03),
-    FourArmStackStyle(tilt=radians(30)),
-    FourArmStackStyle(tilt=radians(10)),
-    FourArmStackStyle(tilt=radians(25), clearance=0.07, waiting=0.16),
-    FourArmStackStyle(tilt=None),
-    FourArmStackStyle(tilt=None, clearance=0.07, waiting=0.16),
-    FourArmStackStyle(home=True),
-    FourArmStackStyle(tilt=None, home=True),
-    FourArmStackStyle(home=True, patient=True),
-    FourArmStackStyle(tilt=None, home=True, patient=True),
+    Style(),
+    Style(turn="retreat", ready=0.03),
+    Style(ready=0.03),
+    Style(tilt=radians(30)),
+    Style(tilt=radians(10)),
+    Style(tilt=radians(25), clearance=0.07, waiting=0.16),
+    Style(tilt=None),
+    Style(tilt=None, clearance=0.07, waiting=0.16),
+    Style(home=True),
+    Style(tilt=None, home=True),
+    Style(home=True, patient=True),
+    Style(tilt=None, home=True, patient=True),
 )
 
 
@@ -96,7 +96,7 @@ def stack_for_four(task: TaskEnv, seed: int) -> NDArray[np.float32]:
 
 
 def _stack(
-    task: TaskEnv, style: FourArmStackStyle, robot: str, base: Floats, start: Floats
+    task: TaskEnv, style: Style, robot: str, base: Floats, start: Floats
 ) -> tuple[Waypoint, ...]:
     """One arm picks its cube, waits for the one before it, and lays its own on top.
 

@@ -24,7 +24,7 @@ LEANS = tuple(map(radians, (0, 20, 40)))  # of an arm, from straight down, outwa
 
 
 @dataclass(frozen=True)
-class RelayStyle:
+class Style:
     """How the baton is taken along.
 
     Attributes:
@@ -43,10 +43,10 @@ class RelayStyle:
 
 
 STYLES = (
-    RelayStyle(),
-    RelayStyle(legs=8, near=0.05),
-    RelayStyle(legs=8, near=0.03, height=0.008, beyond=0.0),
-    RelayStyle(waiting=0.6),
+    Style(),
+    Style(legs=8, near=0.05),
+    Style(legs=8, near=0.03, height=0.008, beyond=0.0),
+    Style(waiting=0.6),
 )
 
 
@@ -65,22 +65,22 @@ def pass_on(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     )
 
 
-def _script(style: RelayStyle, task: TaskEnv, scene: Scene) -> Script:
+def _script(style: Style, task: TaskEnv, scene: Scene) -> Script:
     zones = [np.array([*zone, 0.0]) for zone in find_zones(task.layout)]
     names = list(task.layout.arms)
     script: dict[str, tuple[Waypoint, ...]] = {}
     for i, name in enumerate(names):
-        part = _Arc(style, task, name, scene.base(name), zones[i - 1], zones[i])
+        part = _Part(style, task, name, scene.base(name), zones[i - 1], zones[i])
         script[name] = part.waypoints(after=names[i - 1] if i else None)
     return script
 
 
-class _Arc:
+class _Part:
     """One robot's part of the way: an arc about its base, from the zone before to its own."""
 
     def __init__(
         self,
-        style: RelayStyle,
+        style: Style,
         task: TaskEnv,
         robot: str,
         base: Floats,

@@ -22,7 +22,7 @@ SIDES = {"left": -1.0, "right": 1.0}  # whose end of the bar, along its own x ax
 
 
 @dataclass(frozen=True)
-class LiftBarStyle:
+class Style:
     """How the bar is lifted.
 
     Attributes:
@@ -39,10 +39,10 @@ class LiftBarStyle:
 
 
 STYLES = (
-    LiftBarStyle(),
-    LiftBarStyle(ready=0.02),
-    LiftBarStyle(legs=8, near=0.02, ready=0.02),
-    LiftBarStyle(legs=4, beyond=0.04, near=0.08, ready=0.02),
+    Style(),
+    Style(ready=0.02),
+    Style(legs=8, near=0.02, ready=0.02),
+    Style(legs=4, beyond=0.04, near=0.08, ready=0.02),
 )
 
 
@@ -60,7 +60,7 @@ def lift_for_two(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     return first_success(task, seed, lambda scene: [_script(style, scene) for style in STYLES])
 
 
-def _script(style: LiftBarStyle, scene: Scene) -> Script:
+def _script(style: Style, scene: Scene) -> Script:
     start, quaternion = scene.body(BAR)
     level = turn("z", yaw_of(quaternion))
     tops = np.linspace(HALF_THICKNESS, HEIGHT + style.beyond, style.legs + 1)[1:]

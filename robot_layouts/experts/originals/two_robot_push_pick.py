@@ -24,7 +24,7 @@ GRIP_LEANS = tuple(map(radians, (0, -20, 20, -40, 40)))  # at the goal
 
 
 @dataclass(frozen=True)
-class PushStyle:
+class Style:
     """How the cube is pushed.
 
     Attributes:
@@ -44,10 +44,10 @@ class PushStyle:
 
 # Tried in this order. The first solves each of the seeds 0 … 99.
 STYLES = (
-    PushStyle(),
-    PushStyle(stroke=0.012),
-    PushStyle(until=0.03, near=0.06),
-    PushStyle(until=-0.03, height=0.015),
+    Style(),
+    Style(stroke=0.012),
+    Style(until=0.03, near=0.06),
+    Style(until=-0.03, height=0.015),
 )
 
 
@@ -65,7 +65,7 @@ def push_and_pick(task: TaskEnv, seed: int) -> NDArray[np.float32]:
     return first_success(task, seed, lambda scene: [_script(style, scene) for style in STYLES])
 
 
-def _script(style: PushStyle, scene: Scene) -> Script:
+def _script(style: Style, scene: Scene) -> Script:
     forward = heading(scene.base(PUSHER), scene.base(PICKER))
     ahead = np.array([np.cos(forward), np.sin(forward), 0.0])
     aside = np.array([-ahead[1], ahead[0], 0.0])
