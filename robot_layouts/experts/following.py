@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.experts.motion_drives import NEAR, Aim, MotionDrive, drive_within_bounds
-from robot_layouts.experts.tips import link_tree
+from robots.gripper_motion import link_tree
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.motion import Motion
 from robot_layouts.simulation.backend import Overlap

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.experts.tips import gripper_turn
+from robots.gripper_motion import gripper_turn
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation import State
 from robot_layouts.simulation.world import Body

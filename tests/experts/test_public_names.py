@@ -16,7 +16,7 @@ from robot_layouts.experts import (
     pick,
     rehearse,
 )
-from robot_layouts.experts.tips import gripper_turn
+from robots.gripper_motion import gripper_turn
 from robot_layouts.kinematics.rotations import rotate
 from robots import ActionError, RobotRegistry
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from robot_layouts.experts.motion_drives import Aim, MotionDrive, drive_within_bounds
 from robot_layouts.experts.script import CLOSED, OPEN
-from robot_layouts.experts.tips import link_tree
+from robots.gripper_motion import link_tree
 from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
