@@ -14,8 +14,8 @@ from robot_layouts.core.errors import DescriptorError
 from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
-    pose_matrix,
     quaternion_of,
+    rotation_of,
     transform,
 )
 from robot_layouts.kinematics.tree import Tree
@@ -31,6 +31,7 @@ _AXIS_ALIGNED = 0.7  # cosine; a TCP link that is turned less has the gripper's 
 _SHORT = 1e-4  # m; shorter ways have no direction
 _POSTURES = 9  # of the gripper between its limits, of which the most closed and the next count
 _SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
+_AJAR = 8  # number of the share at which the pads' way is seen
 
 
 class GripperMotion:
@@ -42,7 +43,10 @@ class GripperMotion:
 
     Attributes:
         joints: Names of the gripper's joints.
+        travels: How far each moves from closed to open, (joints,) (rad, m).
         openings: Distance of the two pads at evenly spaced shares from 0 to 1, (65,) (m).
+        turn: Orientation of the gripper's frame in the TCP link's, (3, 3): its y axis is the way in
+            which the pads part at first, whatever `robots.Fingers` says of contact forces.
     """
 
     def __init__(self, robot: RobotDescriptor) -> None:
@@ -64,6 +68,7 @@ class GripperMotion:
         limits = tree.limits[places]
         ends = np.concatenate([_ends(group, tree.limits, robot) for group in groups])
         self._ends = np.clip(ends, limits[:, :1], limits[:, 1:])
+        self.travels = self._ends[:, 1] - self._ends[:, 0]
         rows = np.tile(home_of(robot, tree), (len(_SHARES), 1))
         rows[:, places] = self._positions(_SHARES)
         poses = tree.forward(rows)
@@ -78,6 +83,8 @@ class GripperMotion:
         )
         self._middles = (one + other) / 2
         self.openings = np.linalg.norm(one - other, axis=1)
+        wrist = transform(hand[0], poses[0, _wrist(robot, tree), :3, 3])
+        self.turn = _axes(self._middles[0] - wrist, (one - other)[_AJAR])
 
     @property
     def widest(self) -> float:
@@ -88,6 +95,17 @@ class GripperMotion:
         """Return the least share at which the pads are so far apart (m); 1 if they never are."""
         wide = np.flatnonzero(self.openings >= opening)
         return float(_SHARES[wide[0]]) if len(wide) else float(_SHARES[self.openings.argmax()])
+
+    def slope(self, share: float) -> float:
+        """Return how much wider the gripper opens per share there (m)."""
+        low, high = np.clip((share - 0.05, share + 0.05), 0.0, 1.0)
+        wide = np.interp((low, high), _SHARES, self.openings)
+        return float((wide[1] - wide[0]) / (high - low))
+
+    def share_at(self, positions: Floats) -> float:
+        """Return how far the gripper is open with its joints at some positions (rad, m)."""
+        closed, open_ = self._ends.T
+        return float(np.mean((positions - closed) / (open_ - closed)))
 
     def positions(self, share: float) -> Floats:
         """Return the gripper's joints at a share, (joints,) (rad, m)."""
@@ -100,7 +118,7 @@ class GripperMotion:
 
     def _positions(self, shares: Floats) -> Floats:
         closed, open_ = self._ends.T
-        return closed + shares[:, None] * (open_ - closed)
+        return np.asarray(closed + shares[:, None] * (open_ - closed))
 
 
 @lru_cache(maxsize=64)
@@ -151,9 +169,29 @@ def gripper_turn(robot: RobotDescriptor) -> Floats | None:
 
 
 def gripper_frame(robot: RobotDescriptor) -> Floats:
-    """Return the turn of the gripper's frame in the TCP link's, (3, 3)."""
-    turned = gripper_turn(robot)
-    return pose_matrix(np.zeros(3), IDENTITY if turned is None else turned)[:3, :3]
+    """Return the orientation of the gripper's frame in the TCP link's, (3, 3)."""
+    try:
+        return gripper_motion(robot).turn
+    except DescriptorError:
+        turned = gripper_turn(robot)
+        return rotation_of(IDENTITY if turned is None else turned)
+
+
+def _wrist(robot: RobotDescriptor, tree: Tree) -> int:
+    """Return the link that the last joint of the arm moves."""
+    arm = [joint.child for joint in _model(robot).ordered if joint.name in robot.arm_joints]
+    return max(map(tree.link, arm), key=lambda at: len(tree.path(at)), default=0)
+
+
+def _axes(ahead: Floats, apart: Floats) -> Floats:
+    """Return the frame whose y axis is one way, and whose z axis is nearest to another, (3, 3)."""
+    opening = _unit(apart)
+    if not opening.any():
+        opening = np.array((0.0, 1.0, 0.0))
+    approach = _unit(ahead - ahead @ opening * opening)
+    if not approach.any():
+        approach = _unit(np.cross((1.0, 0.0, 0.0), opening))
+    return np.stack([np.cross(opening, approach), opening, approach], axis=1)
 
 
 def _turn_of_fingers(robot: RobotDescriptor) -> Floats | None:
@@ -163,8 +201,7 @@ def _turn_of_fingers(robot: RobotDescriptor) -> Floats | None:
         return None
     tree = gripper_tree(robot)
     poses = _poses(tree, np.array(robot.keyframe(robot.home.keyframe), float))
-    arm = [joint.child for joint in _model(robot).ordered if joint.name in robot.arm_joints]
-    tcp, wrist = find_tcp(robot, tree), max(map(tree.link, arm), key=lambda at: len(tree.path(at)))
+    tcp, wrist = find_tcp(robot, tree), _wrist(robot, tree)
     turn = poses[tcp.turned, :3, :3]
     one, other = (
         sign * poses[tree.link(link), :3, :3] @ axis

@@ -86,6 +86,11 @@ class Waypoint:
         most: Number of control steps after which, if it is not done, the script has failed.
         at: Instead of ``to``, where the TCP should be, (3,) (m, world), turned in any way: for arms
             of too few joints to choose that too.
+        joints: Instead of ``to``, postures of the arm, each (arm joints,) (rad), worked out from the
+            scene when the waypoint begins; the one with the shortest way there is taken.
+        share: Instead of ``gripper``, how far the gripper is open meanwhile, from 0 to 1; see
+            `robots.gripper_motion.GripperMotion`.
+        squeeze: Instead of both, the force with which its fingers close meanwhile (N).
     """
 
     name: str
@@ -98,6 +103,9 @@ class Waypoint:
     turn: Callable[[Floats], Floats] | None = None
     most: int | None = None
     at: Callable[[Scene], Floats] | None = None
+    joints: Callable[[Scene], Sequence[Floats]] | None = None
+    share: float | None = None
+    squeeze: float | None = None
 
 
 Script = Mapping[str, Sequence[Waypoint]]

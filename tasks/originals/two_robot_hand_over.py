@@ -39,11 +39,11 @@ class TwoRobotHandOver(MultiRobotTask):
     """
 
     source = "robot-layouts; geometry and rewards are its own"
-    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=1.3)
+    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=1.5)
     needs = {"*": Needs(fingers=True, opening=2 * CUBE_HALF_SIZE)}
     fits_robots = True
     physics = PhysicsSettings()
-    max_episode_steps = 200
+    max_episode_steps = 600  # small arms move by 0.3 rad per second
     max_reward = 9
     viewpoint = ((1.4, 0.4, 0.75), (0.0, 0.0, 0.1))
     cameras = (Camera((1.0, 0.0, 0.75), (0.0, 0.0, 0.1)),)
