@@ -31,6 +31,7 @@ _AXIS_ALIGNED = 0.7  # cosine; a TCP link that is turned less has the gripper's 
 _SHORT = 1e-4  # m; shorter ways have no direction
 _POSTURES = 9  # of the gripper between its limits, of which the most closed and the next count
 _SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
+_LEAST_WORK = 1e-9  # J; of drives that have no stiffness
 _AJAR = 8  # number of the share at which the pads' way is seen
 
 
@@ -43,7 +44,6 @@ class GripperMotion:
 
     Attributes:
         joints: Names of the gripper's joints.
-        travels: How far each moves from closed to open, (joints,) (rad, m).
         openings: Distance of the two pads at evenly spaced shares from 0 to 1, (65,) (m).
         turn: Orientation of the gripper's frame in the TCP link's, (3, 3): its y axis is the way in
             which the pads part at first, whatever `robots.Fingers` says of contact forces.
@@ -68,7 +68,8 @@ class GripperMotion:
         limits = tree.limits[places]
         ends = np.concatenate([_ends(group, tree.limits, robot) for group in groups])
         self._ends = np.clip(ends, limits[:, :1], limits[:, 1:])
-        self.travels = self._ends[:, 1] - self._ends[:, 0]
+        stiffness = [np.broadcast_to(group.stiffness, len(group.joints)) for group in groups]
+        self._work = float(np.concatenate(stiffness) @ (self._ends[:, 1] - self._ends[:, 0]) ** 2)
         rows = np.tile(home_of(robot, tree), (len(_SHARES), 1))
         rows[:, places] = self._positions(_SHARES)
         poses = tree.forward(rows)
@@ -101,6 +102,18 @@ class GripperMotion:
         low, high = np.clip((share - 0.05, share + 0.05), 0.0, 1.0)
         wide = np.interp((low, high), _SHARES, self.openings)
         return float((wide[1] - wide[0]) / (high - low))
+
+    def pressing(self, force: float, share: float) -> float:
+        """Return by how much of a share a target is more closed that presses with a force (N).
+
+        By virtual work: the forces of the drives along the joints' ways are those of the fingers
+        along theirs.
+        """
+        return force * self.slope(share) / max(self._work, _LEAST_WORK)
+
+    def force(self, step: float, share: float) -> float:
+        """Return the force that a target presses with which is more closed by a length (m) (N)."""
+        return step * self._work / self.slope(share) ** 2
 
     def share_at(self, positions: Floats) -> float:
         """Return how far the gripper is open with its joints at some positions (rad, m)."""

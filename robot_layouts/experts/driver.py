@@ -65,19 +65,7 @@ class ArmDriver:
         """Return the share towards which the gripper presses with a force, by its drives."""
         motion = gripper_motion(self._descriptor)
         now = motion.share_at(qpos[[self._place[joint] for joint in motion.joints]])
-        stiffness = {
-            joint: value
-            for group in self._groups.values()
-            for joint, value in zip(
-                group.joints, np.broadcast_to(group.stiffness, len(group.joints)), strict=True
-            )
-        }
-        # By virtual work: the drives' forces along the joints' ways are the fingers' along theirs.
-        work = sum(
-            stiffness[joint] * travel**2
-            for joint, travel in zip(motion.joints, motion.travels, strict=True)
-        )
-        return now - force * motion.slope(now) / max(work, 1e-9)
+        return now - motion.pressing(force, now)
 
     def _opening(self, group: JointGroup, goals: Mapping[str, float]) -> Floats:
         """Return the one number of a group that brings its first joint to its goal."""

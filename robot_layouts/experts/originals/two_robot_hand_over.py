@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice, product
@@ -39,7 +39,7 @@ LEANS = tuple(map(radians, (20, 50, 80, 100)))  # of the giver when it gives, fr
 HEADINGS = tuple(map(radians, (0, 45, -45)))  # of the giver then, from the way to the meeting
 UPWARD = -0.2  # cosine: a gripper that picks points down more than that
 STRIDE = 0.4  # rad between postures on a way that are checked
-CLOSING = 60.0  # N with which fingers close until they feel the cube
+CLOSING, STEP = 60.0, 4e-4  # N with which fingers close until they feel the cube, or m per step
 FORCE, LEAST_FORCE = 15.0, 1.5  # N with which they do, on a cube for Pandas; on any
 CROSSWISE = 0.5  # cosine between the ways in which two hands open that hold different faces
 SIMILAR = 0.5  # cosine between the approach that was planned and that which is taken
@@ -109,7 +109,9 @@ class _Search:
         self._before, self._crosswise = depth * self._edge, depth < OWN_HALF
         self._shares = [self._share(hand) for hand in (self._giver, self._taker)]
         self._alone = RobotsAlone(
-            task.standing(), task.scenario.physics, lambda world, _: task.table.add_to(world, "table")
+            task.standing(),
+            task.scenario.physics,
+            lambda world, _: task.table.add_to(world, "table"),
         )
         self._usual = self._parts({})
 
@@ -168,8 +170,7 @@ class _Search:
         return Postures(picks.which[order], picks.qpos[order], picks.turns[order])
 
     def _meetings(self, picks: Postures) -> Iterator[_Meeting]:
-        giver, taker = self._giver, self._taker
-        length = self._fit.length
+        giver = self._giver
         ground = [self._fit.place((0.0, aside, height)) for height in HEIGHTS for aside in ASIDE]
         middles = np.array(ground)
         ways = heading(giver.base[:3, 3], middles.mean(axis=0))
@@ -184,7 +185,7 @@ class _Search:
             some = np.argsort(ways_there)[:MEETINGS]
             # The cube is turned with the gripper that holds it.
             cube_turns = gives.turns[some] @ picks.turns[pick].T @ self._cube[:3, :3]
-            yield from self._takes(picks.qpos[pick], gives, some, cube_turns, middle, length)
+            yield from self._takes(picks.qpos[pick], gives, some, cube_turns, middle)
 
     def _free_picks(self, picks: Postures) -> list[int]:
         """Return the first picks in which the giver touches nothing but the cube."""
@@ -199,7 +200,6 @@ class _Search:
         some: NDArray[np.intp],
         cube_turns: Floats,
         middle: Floats,
-        length: Callable[[float], float],
     ) -> Iterator[_Meeting]:
         """Yield the meetings in which the taker can hold the cube, where the giver gives it."""
         taker, share = self._taker, self._shares[1]
@@ -301,27 +301,29 @@ class _Search:
         back = partial(self._off, self._giver, meeting.pick, picked, give_share)
         return {
             GIVER: (
-                Waypoint("above", joints=partial(back, by=length(BACK)), share=give_share, near=0.08),
-                Waypoint("around", joints=partial(back, by=0.0), share=give_share, near=0.02),
-                Waypoint("grasp", squeeze=CLOSING, until=cube_held, most=150),
+                Waypoint(
+                    "above", joints=partial(back, by=length(BACK)), share=give_share, near=0.08
+                ),
+                Waypoint("around", joints=partial(back, by=0.0), share=give_share, near=0.06),
+                Waypoint("grasp", squeeze=self._closing(self._giver), until=cube_held, most=150),
                 Waypoint("hold", squeeze=force, steps=4, until=cube_held, most=20),
                 Waypoint("lift", joints=partial(self._lift, meeting), squeeze=force, near=0.08),
-                Waypoint("present", joints=partial(self._give, meeting), squeeze=force, near=0.03),
+                Waypoint("present", joints=partial(self._give, meeting), squeeze=force, near=0.06),
                 Waypoint("release", share=give_share, steps=3, after=("right.take",)),
-                Waypoint("retreat", joints=self._retreat, share=give_share),
+                Waypoint("retreat", joints=self._retreat, share=give_share, near=0.1),
             ),
             TAKER: (
                 Waypoint(
-                    "ready", joints=partial(self._expect, meeting), share=take_share, near=0.05
+                    "ready", joints=partial(self._expect, meeting), share=take_share, near=0.1
                 ),
                 Waypoint(
                     "around",
                     joints=partial(self._take, meeting),
                     share=take_share,
-                    near=0.02,
+                    near=0.06,
                     after=("left.present",),
                 ),
-                Waypoint("take", squeeze=CLOSING, until=cube_taken, most=150),
+                Waypoint("take", squeeze=self._closing(self._taker), until=cube_taken, most=150),
                 Waypoint(
                     "hold",
                     squeeze=force,
@@ -330,9 +332,13 @@ class _Search:
                     until=cube_taken,
                     most=20,
                 ),
-                Waypoint("carry", joints=self._carry, squeeze=force, near=0.02),
+                Waypoint("carry", joints=self._carry, squeeze=force, near=0.1),
             ),
         }
+
+    def _closing(self, hand: Hand) -> float:
+        """Return the force with which a hand closes until it feels the cube (N)."""
+        return max(CLOSING, hand.motion.force(STEP, hand.motion.share(self._edge)))
 
     def _near(
         self, hand: Hand, place: Floats, turn: Floats, point: Floats, start: Floats
