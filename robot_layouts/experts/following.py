@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.experts.motion_drives import NEAR, Aim, MotionDrive, drive_within_bounds
-from robot_layouts.experts.tips import link_tree
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.motion import Motion
 from robot_layouts.simulation.backend import Overlap
 from robot_layouts.simulation.checks.overlaps import between_robots, deepest
 from robots import TaskError
 from robots.action_split import is_gripper
+from robots.gripper_motion import link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 from tasks.driving import driven_groups, joint_slices

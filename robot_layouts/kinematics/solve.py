@@ -86,7 +86,12 @@ class Solutions:
 
 
 def solve(
-    tree: Tree, goal: IkGoal, starts: Floats, free: Sequence[int], iterations: int = ITERATIONS
+    tree: Tree,
+    goal: IkGoal,
+    starts: Floats,
+    free: Sequence[int],
+    iterations: int = ITERATIONS,
+    turn_worth: float = 1.0,
 ) -> Solutions:
     """Bring a tree to a goal by damped least squares, from every start at once.
 
@@ -96,12 +101,14 @@ def solve(
         starts: Coordinates, (n, coordinates) (rad, m).
         free: Indices of the coordinates that may move, within their limits.
         iterations: How many steps it takes at most.
+        turn_worth: Distance that counts as much as a turn by 1 rad (m): less where joints are too
+            few for both, so that the place comes first.
     """
     needed = tree.towards([*goal.links, goal.turned])
     links = [needed.link(tree.links[link]) for link in goal.links]
     turned = needed.link(tree.links[goal.turned])
     goal = replace(goal, links=links, turned=turned)
-    qpos = _solved(needed, goal, starts.copy(), free, iterations)
+    qpos = _solved(needed, goal, starts.copy(), free, iterations, turn_worth)
     missing, turn_missing = shortfalls(needed, goal, qpos)
     solved = (missing < NEAR_ENOUGH[0]) & (turn_missing < NEAR_ENOUGH[1])
     return Solutions(qpos, missing, turn_missing, solved)
@@ -193,12 +200,21 @@ def _share(way: Floats, at: Floats, low: Floats, high: Floats) -> float:
     return float(np.clip(shares.min(initial=1.0), 0.0, 1.0))
 
 
-def _solved(tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int], iterations: int) -> Floats:
+def _solved(
+    tree: Tree,
+    goal: IkGoal,
+    qpos: Floats,
+    free: Sequence[int],
+    iterations: int,
+    turn_worth: float,
+) -> Floats:
     limits = tree.limits[free]
     rows = 3 if goal.rotation is None else 6
+    worth = np.array((1.0, 1.0, 1.0, turn_worth, turn_worth, turn_worth))[:rows]
     damping = DAMPING**2 * np.eye(rows)
     for _ in range(iterations):
         errors, slopes = _errors(tree, goal, qpos, free)
+        errors, slopes = errors * worth, slopes * worth[:, None]
         if (np.abs(errors).max(axis=1) < NEAR_ENOUGH[0] / 10).all():
             break
         # A joint at a limit that it is drawn beyond leaves the way to the others.

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from robot_layouts.experts.motion_drives import Aim, MotionDrive, drive_within_bounds
 from robot_layouts.experts.script import CLOSED, OPEN
-from robot_layouts.experts.tips import link_tree
 from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
@@ -21,6 +20,7 @@ from robot_layouts.kinematics.solve import IkGoal, approach
 from robot_layouts.simulation import State
 from robots import TaskError
 from robots.action_split import is_gripper
+from robots.gripper_motion import link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 from tasks.driving import DrivenGroup, driven_groups, joint_slices
