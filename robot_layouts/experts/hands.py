@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -26,7 +25,7 @@ RANDOM_STARTS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Postures:
+class HandPostures:
     """Postures of a hand.
 
     Attributes:
@@ -118,7 +117,7 @@ class Hand:
         *,
         scatter: bool = True,
         loose: bool = False,
-    ) -> Postures:
+    ) -> HandPostures:
         """Return the postures that bring a point of the TCP link to places, for each at most one.
 
         Args:
@@ -150,7 +149,7 @@ class Hand:
         ways = np.where(fits, ways, np.inf).reshape(n, s)
         which = np.flatnonzero(np.isfinite(ways.min(axis=1)))
         best = qpos.reshape(n, s, -1)[which, ways.argmin(axis=1)[which]]
-        return Postures(which, best, self.turns(best))
+        return HandPostures(which, best, self.turns(best))
 
     def _descended(self, goal: IkGoal, rows: Floats, worth: float) -> Floats:
         """Bring rows of postures towards a goal; those that are far from it soon are left there."""
@@ -205,8 +204,3 @@ def between(one: Floats, other: Floats) -> Floats:
         other: Of the other's, (…, 3, 3).
     """
     return (one[..., 2] * other[..., 2]).sum(axis=-1)
-
-
-def stack(rows: Sequence[Floats]) -> Floats:
-    """Return rows on top of each other, (n, …)."""
-    return np.concatenate(rows) if rows else np.zeros((0, 3))

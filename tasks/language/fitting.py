@@ -147,13 +147,16 @@ def shared_place(layout: Layout, places: tuple[str, ...]) -> tuple[tuple[float, 
 
 def _alike(arm: Placement, own: Placement) -> bool:
     """Return whether an arm stands where a task's own does, and reaches and holds as much."""
+    if arm.robot == own.robot:
+        return arm.base_pose == own.base_pose
     same = (arm.base_pose, arm.robot.reach) == (own.base_pose, own.robot.reach)
     return same and _opening(arm.robot) == _opening(own.robot)
 
 
 def _opening(robot: RobotDescriptor) -> float | None:
+    """Return how wide a gripper opens, to 0.1 mm (m); None of one that has no fingers."""
     try:
-        return gripper_motion(robot).widest
+        return round(gripper_motion(robot).widest, 4)
     except DescriptorError:
         return None
 

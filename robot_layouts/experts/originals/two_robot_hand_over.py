@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from robot_layouts.experts.geometry import gripper_facing, heading
 from robot_layouts.experts.grasps import need_fingers
-from robot_layouts.experts.hands import Hand, Postures, between, box_grips, offsets
+from robot_layouts.experts.hands import Hand, HandPostures, between, box_grips, offsets
 from robot_layouts.experts.rehearsal import first_success
 from robot_layouts.experts.script import Scene, Script, Waypoint
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, rotation_about, rotation_of
@@ -75,7 +75,7 @@ def hand_over(task: TaskEnv, seed: int) -> NDArray[np.float32]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Meeting:
+class _Exchange:
     """How the cube changes hands.
 
     Attributes:
@@ -153,7 +153,7 @@ class _Search:
             )
         return hand.motion.share((1 + SLACK) * self._edge)
 
-    def _picks(self) -> Postures:
+    def _picks(self) -> HandPostures:
         """Return postures in which the giver holds the cube as it lies, the best first."""
         hand, share = self._giver, self._shares[0]
         turns = box_grips(self._cube[:3, :3])
@@ -167,9 +167,9 @@ class _Search:
             raise TaskError(f"{GIVER!r} cannot reach the cube with its gripper")
         down = 1 + picks.turns[:, 2, 2]
         order = np.argsort(hand.way(picks.qpos, starts[0]) + down)
-        return Postures(picks.which[order], picks.qpos[order], picks.turns[order])
+        return HandPostures(picks.which[order], picks.qpos[order], picks.turns[order])
 
-    def _meetings(self, picks: Postures) -> Iterator[_Meeting]:
+    def _meetings(self, picks: HandPostures) -> Iterator[_Exchange]:
         giver = self._giver
         ground = [self._fit.place((0.0, aside, height)) for height in HEIGHTS for aside in ASIDE]
         middles = np.array(ground)
@@ -187,7 +187,7 @@ class _Search:
             cube_turns = gives.turns[some] @ picks.turns[pick].T @ self._cube[:3, :3]
             yield from self._takes(picks.qpos[pick], gives, some, cube_turns, middle)
 
-    def _free_picks(self, picks: Postures) -> list[int]:
+    def _free_picks(self, picks: HandPostures) -> list[int]:
         """Return the first picks in which the giver touches nothing but the cube."""
         free = (i for i in range(len(picks)) if self._clear({self._giver.owner: picks.qpos[i]}))
         found = list(islice(free, PICKS))
@@ -196,11 +196,11 @@ class _Search:
     def _takes(
         self,
         pick: Floats,
-        gives: Postures,
+        gives: HandPostures,
         some: NDArray[np.intp],
         cube_turns: Floats,
         middle: Floats,
-    ) -> Iterator[_Meeting]:
+    ) -> Iterator[_Exchange]:
         """Yield the meetings in which the taker can hold the cube, where the giver gives it."""
         taker, share = self._taker, self._shares[1]
         start = taker.opened(taker.qpos(self._scene), share)
@@ -231,7 +231,7 @@ class _Search:
                 + 0.5 * float(taker.way(takes.qpos[i], start))
                 + 1.5 * (1 + apart)
             )
-            yield _Meeting(
+            yield _Exchange(
                 pick,
                 gives.qpos[row],
                 gives.turns[row],
@@ -251,7 +251,7 @@ class _Search:
         way[2] = 0.0
         return bool(grip[:, 2] @ way > -0.3 * np.linalg.norm(way))
 
-    def _ends(self, point: Floats, starts: Floats) -> Postures:
+    def _ends(self, point: Floats, starts: Floats) -> HandPostures:
         """Return postures in which the taker has a point of its TCP link at the goal."""
         goal = self._scene.body(GOAL)[0]
         towards = heading(self._taker.base[:3, 3], goal)
@@ -260,7 +260,7 @@ class _Search:
             np.tile(goal, (len(turns), 1)), turns, point, starts, scatter=True, loose=True
         )
 
-    def _is_free(self, meeting: _Meeting) -> bool:
+    def _is_free(self, meeting: _Exchange) -> bool:
         """Return whether no robot is inside itself, the other or the table where they meet."""
         giver, taker = self._giver, self._taker
         held = giver.motion.share(self._edge)
@@ -290,7 +290,7 @@ class _Search:
 
     # -- the script --------------------------------------------------------------------------
 
-    def _script(self, meeting: _Meeting) -> Script:
+    def _script(self, meeting: _Exchange) -> Script:
         cube_held = partial(Scene.grasps, robot=GIVER, body=CUBE)
         cube_taken = partial(Scene.grasps, robot=TAKER, body=CUBE)
         length = self._fit.length
@@ -354,13 +354,13 @@ class _Search:
         place = scene.body(CUBE)[0] + offsets(turn[None], self._before + by)[0]
         return self._near(hand, place, turn, hand.motion.middle(share), posture)
 
-    def _lift(self, meeting: _Meeting, scene: Scene) -> Sequence[Floats]:
+    def _lift(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
         hand, held = self._giver, self._giver.held(scene, CUBE)
         now = hand.qpos(scene)
         place = scene.body(CUBE)[0] + (0.0, 0.0, self._fit.length(LIFT))
         return self._near(hand, place, hand.turns(now[None])[0], held, now)
 
-    def _give(self, meeting: _Meeting, scene: Scene) -> Sequence[Floats]:
+    def _give(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
         held = self._giver.held(scene, CUBE)
         return self._near(self._giver, meeting.place, meeting.turn, held, meeting.give)
 
@@ -371,14 +371,14 @@ class _Search:
         place = link[:3, 3] + offsets(turn[None], self._fit.length(RETREAT))[0]
         return self._near(hand, place, turn, np.zeros(3), now)
 
-    def _expect(self, meeting: _Meeting, scene: Scene) -> Sequence[Floats]:
+    def _expect(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
         turn = self._taker.turns(meeting.take[None])[0]
         by = self._before + self._fit.length(BACK)
         place = meeting.place + offsets(turn[None], by)[0]
         middle = self._taker.motion.middle(self._shares[1])
         return self._near(self._taker, place, turn, middle, meeting.take)
 
-    def _take(self, meeting: _Meeting, scene: Scene) -> Sequence[Floats]:
+    def _take(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
         """Return postures that hold the cube as the giver holds it by now, about as planned."""
         position, quaternion = scene.body(CUBE)
         hand, giver = self._taker, self._giver
