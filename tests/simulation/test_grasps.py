@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from robot_layouts.simulation.grasps import FEW, grasped
+from robot_layouts.simulation.maths import Floats
 from robots import Fingers
+from robots.descriptor import Vector3
 
 AS_IT_IS, ROLLED = (1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.5**0.5, 0.0, 0.0)  # by 90 degrees about x
 
@@ -27,7 +29,7 @@ def test_fingers_hold_what_presses_along_their_axes(axis, turned, way):
     assert grasped(fingers, np.array([press, -press]), poses).tolist() == [True, False]
 
 
-def _drawn(fingers: Fingers, rng: np.random.Generator, count: int):
+def _drawn(fingers: Fingers, rng: np.random.Generator, count: int) -> tuple[Floats, list[Floats]]:
     """Forces, (2, count, 3), and poses: any of both, and some within rounding of a threshold."""
     poses = rng.normal(size=(2, count, 7)).astype(np.float32)
     poses[:, ::2, 3:] /= np.linalg.norm(poses[:, ::2, 3:], axis=2, keepdims=True)
@@ -51,7 +53,7 @@ def _drawn(fingers: Fingers, rng: np.random.Generator, count: int):
 @pytest.mark.parametrize("max_angle", [0.0, 0.01, 20.0, 85.0, 110.0, 180.0])
 @pytest.mark.parametrize("min_force", [0.0, 0.5, 2000.0])
 @pytest.mark.parametrize("axis", [(0.0, 1.0, 0.0), (0.3, -2.0, 1.0)])
-def test_few_worlds_are_judged_as_many_are(max_angle, min_force, axis):
+def test_few_worlds_are_judged_as_many_are(max_angle: float, min_force: float, axis: Vector3):
     """Plain floats judge a few; torch, as native does, judges many at once."""
     fingers = Fingers(("one", "other"), (1, -1), min_force, max_angle, (axis, axis))
     count = 40 * FEW
