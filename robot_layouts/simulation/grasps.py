@@ -19,7 +19,7 @@ from robots.descriptor import Vector3
 # a plain float gives. Of the force (N, and as a share of it) and of the angle's cosine.
 NEAR_FORCE, NEAR_COSINE = 1e-4, 1e-5
 LARGEST = 1e9  # N, and of a quaternion's entries: float32 holds the square of neither much longer
-FEW = 8  # worlds up to which plain floats take less time than torch
+FEW = 32  # worlds up to which plain floats take less time than torch: half of it for so many
 
 
 class _Thresholds(NamedTuple):

@@ -56,7 +56,7 @@ def _drawn(fingers: Fingers, rng: np.random.Generator, count: int) -> tuple[Floa
 def test_few_worlds_are_judged_as_many_are(max_angle: float, min_force: float, axis: Vector3):
     """Plain floats judge a few; torch, as native does, judges many at once."""
     fingers = Fingers(("one", "other"), (1, -1), min_force, max_angle, (axis, axis))
-    count = 40 * FEW
+    count = 10 * FEW
     rng = np.random.default_rng([int(100 * max_angle), int(min_force), int(axis[0] * 10)])
     forces, poses = _drawn(fingers, rng, count)
     together = grasped(fingers, forces, poses)
