@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import tasks
 from robot_layouts.simulation.grasps import FEW, grasped
 from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import Fingers
 from robots.descriptor import Vector3
+from tests.motions import touching_episode
 
 AS_IT_IS, ROLLED = (1.0, 0.0, 0.0, 0.0), (0.5**0.5, 0.5**0.5, 0.0, 0.0)  # by 90 degrees about x
 
@@ -72,3 +75,24 @@ def test_few_worlds_are_judged_as_many_are(max_angle: float, min_force: float, a
     with np.errstate(divide="ignore", invalid="ignore"):
         few = grasped(fingers, forces[:, :1], [pose[:1] for pose in poses])
         assert few.tolist() == grasped(fingers, forces, poses)[:1].tolist()
+
+
+def test_forces_are_the_sums_of_what_sapien_says_of_each_point():
+    """Points of a contact are added up in float32, and contacts in float64, as native does."""
+    env, pressed = tasks.make("PickCube-v1"), 0
+    episode = touching_episode("PickCube-v1", 0)
+    env.reset(0)
+    (world,) = worlds_below(env.simulation)
+    body, timestep = world.bodies["cube"].component, np.float32(world.physics.timestep)
+    for action in episode.actions:
+        env.step(action)
+        for name in ("panda_leftfinger", "panda_rightfinger"):
+            link, total = world.robots["arm"].links[name], np.zeros(3)
+            for contact in world.system.get_contacts():
+                if contact.bodies in ([link, body], [body, link]):
+                    sign = 1 if contact.bodies[0] is link else -1
+                    total += sign * np.sum([point.impulse for point in contact.points], axis=0)
+            force = env.simulation.read().contact_force("arm", name, "cube")
+            assert force.tolist() == [(total.astype(np.float32) / timestep).tolist()]
+            pressed += bool(total.any())
+    assert pressed >= 10
