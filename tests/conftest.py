@@ -79,6 +79,23 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
             pytest.skip(problem)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def one_device() -> Iterator[None]:
+    """Let everything draw on native's device: a process can draw on no more than one."""
+    if importlib.util.find_spec("mani_skill") is None:
+        yield
+        return
+    import sapien.render
+    from sapien import Device
+
+    made = sapien.render.RenderSystem
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            sapien.render, "RenderSystem", lambda device=None: made(device or Device("cpu"))
+        )
+        yield
+
+
 @pytest.fixture(scope="session")
 def renderer() -> object:
     """Keep alive what all pictures of a process share, or None where nothing can be drawn.

@@ -168,8 +168,8 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
         shared.step(ACTION)
     start, started = Worker.__init__, []
 
-    def doomed(self, *args):
-        start(self, *args)
+    def doomed(self, *args, **kwargs):
+        start(self, *args, **kwargs)
         if not started:
             os.kill(self.pid, signal.SIGKILL)
         started.append(self)
