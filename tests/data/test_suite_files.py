@@ -113,10 +113,13 @@ def test_the_hash_is_of_the_content_of_layouts(whole):
     assert load_suite(whole).hash != before.hash
 
 
+NEWER = {"TwoRobotHandOver-v1"}  # than the suite, which never changes
+
+
 def test_the_standard_suite():
     """If it has changed, papers that name its hash speak of another one: give it a new name."""
     suite = load_suite("standard")
-    assert {case.task for case in suite.cases} == {*CATALOGUE}
+    assert {case.task for case in suite.cases} == {*CATALOGUE} - NEWER
     assert all(case.seeds == tuple(range(100)) and case.layout is None for case in suite.cases)
     assert suite.id == "5bcba24a6284"
     assert suite.name == "standard"

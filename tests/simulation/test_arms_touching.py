@@ -57,7 +57,7 @@ def test_limbs_of_one_robot_are_arms():
 
 
 def test_it_must_be_looked_at_before():
-    with pytest.raises(SimulationError, match=r"call watch_arms\(\) before"):
+    with pytest.raises(SimulationError, match=r"call watch_arms\(\) first"):
         Simulation(single({"arm": "panda"}), empty, 1).backend.arms_touching(0)
 
 
