@@ -31,6 +31,8 @@ STAGES = (
     "beside",
     "trial",
     "tcp_move",
+    "grasps",
+    "tcp_control",
     "agreement",
     "to_urdf",
     "to_drake",
@@ -49,6 +51,10 @@ QUESTIONS: Mapping[str, str] = {
     "steps_500": "500 steps",
     "numbers": "its own joints",
     "tcp_move": "TCP move",
+    "fingers": "fingers known",
+    "between": "TCP between the tips",
+    "grasps": "grasps a cube",
+    "ee": "TCP modes",
     "agreement": "checks as physics",
     "to_urdf": "URDF",
     "to_drake": "Drake",
@@ -184,6 +190,8 @@ def judge(seen: Seen, expected: Expected) -> dict[str, Answer]:
     length = "" if error is None else f"{error * 1e3:.1f} mm" if error < 1 else "far off"
     came = _yes(error is not None and error < TCP_ERROR, length)
     answers["tcp_move"] = came if expected.kind in WITH_TCP else NOT_ASKED
+    answers |= _grasps(seen.get("grasps", {}), expected)
+    answers["ee"] = _tcp_control(seen.get("tcp_control", {}), expected)
     answers["agreement"] = _agreement(seen.get("agreement", {}))
     return {question: answers[question] for question in QUESTIONS}
 
@@ -296,6 +304,27 @@ def _steps(trial: Seen, steps: int) -> Answer:
         return Answer(False, "kicks")
     exploded = trial["exploded"]
     return _yes(exploded is None or exploded > steps, f"step {exploded}")
+
+
+def _grasps(seen: Seen, expected: Expected) -> dict[str, Answer]:
+    """Answer for the grippers that are expected; a record may be older than the questions."""
+    questions, count = ("fingers", "between", "grasps"), seen.get("grippers", 0)
+    if not seen or not any(arm.gripper for arm in expected.arms.values()):
+        return dict.fromkeys(questions, NOT_ASKED)
+    return {
+        question: _yes(0 < count == seen.get(question), f"{seen.get(question, 0)} of {count}")
+        for question in questions
+    }
+
+
+def _tcp_control(seen: Seen, expected: Expected) -> Answer:
+    """Answer whether TCPs stay under zeros, and follow a square or say by how much they do not."""
+    if not seen or expected.kind not in WITH_TCP or seen.get("modes") == 0:
+        return NOT_ASKED
+    if "modes" not in seen:
+        return _yes(False)
+    away = max(seen["drift"], seen["corner"])
+    return _yes(not seen["problems"], f"{away * 1e3:.0f} mm" if away < 1 else "far off")
 
 
 def _agreement(seen: Seen) -> Answer:

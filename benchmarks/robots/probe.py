@@ -24,7 +24,9 @@ from layouts.validation.collisions import nearest
 from layouts.validation.collisions import stand as stand_hulls
 from robot_layouts.kinematics.rotations import Floats, inverse_pose
 from robot_layouts.simulation import PhysicsSettings
+from robot_layouts.simulation.checks.grasp import try_grasps
 from robot_layouts.simulation.checks.overlaps import empty, stand
+from robot_layouts.simulation.checks.tcp_control import try_tcp_control
 from robot_layouts.simulation.checks.trial import tcp_error, try_robot
 from robot_layouts.simulation.simulation import Simulation
 from robots import RobotDescriptor, RobotLayoutsError
@@ -115,6 +117,29 @@ def _trial(robot: RobotDescriptor) -> Seen:
         "numbers": len(seen.numbers),
         "wrong_numbers": [n.number.name for n in seen.numbers if n.problem is not None],
         "problems": list(seen.problems[:4]),
+    }
+
+
+def _grasps(robot: RobotDescriptor) -> Seen:
+    """Close each gripper on a cube, and return which of them are understood, and hold it."""
+    seen = list(try_grasps(robot))
+    return {
+        "grippers": len(seen),
+        "fingers": sum(one.fingers is not None for one in seen),
+        "between": sum(one.between for one in seen),
+        "grasps": sum(one.grasps for one in seen),
+        "problems": [one.problem for one in seen if one.problem is not None],
+    }
+
+
+def _tcp_control(robot: RobotDescriptor) -> Seen:
+    """Move each TCP by the modes that control it, and return what goes wrong."""
+    seen = list(try_tcp_control(robot)) if robot.arm_joints else []
+    return {
+        "modes": len(seen),
+        "drift": _rounded(max((one.drift for one in seen), default=0.0)),
+        "corner": _rounded(max((one.corner for one in seen), default=0.0)),
+        "problems": [one.problem for one in seen if one.problem is not None],
     }
 
 
@@ -250,6 +275,8 @@ LOOKS: Looks = {
     ),
     "trial": _trial,
     "tcp_move": _tcp_move,
+    "grasps": _grasps,
+    "tcp_control": _tcp_control,
     "agreement": _agreement,
     "to_urdf": _exported_urdf,
     "to_drake": _exported_drake,

@@ -67,6 +67,9 @@ TARGETS: Mapping[str, float] = {
     "beside": 95,
     "steps_50": 97,
     "numbers": 95,
+    "fingers": 97,
+    "grasps": 92,
+    "ee": 100,
     "no_raw": 100,
     "no_crash": 100,
 }
