@@ -1,4 +1,4 @@
-"""Grippers that are closed on a cube: what is seen of one that holds it, and of ones that do not."""
+"""Grippers that are closed on a cube: ones that hold it, and ones that do not."""
 
 from __future__ import annotations
 
