@@ -77,7 +77,8 @@ def inspect(
 def _try(robot: RobotDescriptor, console: Console) -> tuple[str, ...]:
     """Try a robot, print what was seen, and return what is wrong."""
     trial, grasps = try_robot(robot, STEPS), tuple(try_grasps(robot))
-    tcps = tuple(try_tcp_control(robot)) if robot.arm_joints else ()
+    steers = robot.arm_joints and not trial.problems
+    tcps = tuple(try_tcp_control(robot)) if steers else ()
     more = [one.problem for one in (*grasps, *tcps) if one.problem is not None]
     problems = (*trial.problems, *more)
     console.print(f"{trial.robot.name}: {trial.robot.summary}")
