@@ -68,11 +68,7 @@ class Size:
         self.code += len(code - imports - documentation)
         self.lines += source.count("\n")
         self.imports += len(imports)
-        self.classes.update(
-            node.name
-            for node in tree.body
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
-        )
+        self.classes.update(node.name for node in tree.body if isinstance(node, ast.ClassDef))
 
 
 def measure(folder: Path) -> Size:

@@ -85,7 +85,7 @@ class Soak:
         """Check the numbers.
 
         Raises:
-            TaskError: If one makes no sense.
+            TaskError: If one is invalid.
         """
         for name, least in (("steps", 1), ("num_envs", 1), ("workers", 1), ("laps", 3)):
             if (value := getattr(self, name)) < least:
@@ -163,7 +163,7 @@ def soak(
         laps: How many times all tasks are stepped.
 
     Raises:
-        RobotLayoutsError: If an argument makes no sense, or a worker is lost.
+        RobotLayoutsError: If an argument is invalid, or a worker is lost.
     """
     names = tuple(get_task_class(name).task_id for name in tasks or list_tasks())
     found = run(Soak(steps, names, envs, workers, laps))

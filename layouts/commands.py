@@ -19,7 +19,7 @@ from robots import LayoutError, UnknownNameError
 from robots.named import FORMS, named_robot
 
 if TYPE_CHECKING:
-    from layouts.viewer import Cell
+    from layouts.viewer import ShownCell
 
 FORMATS: dict[str, Callable[..., Path]] = {
     "mjcf": Layout.to_mjcf,
@@ -154,7 +154,7 @@ class Page(Server):
 
     html: File | None = None
 
-    def show(self, cell: Callable[[], Cell]) -> None:
+    def show(self, cell: Callable[[], ShownCell]) -> None:
         """Serve or save a page.
 
         Args:
@@ -222,7 +222,7 @@ def validate(
         picture: Save a view (.png, .pdf or .svg).
 
     Raises:
-        RobotLayoutsError: If there is no such layout, or an option makes no sense.
+        RobotLayoutsError: If there is no such layout, or an option is invalid.
     """
     report = layout.layout().validate(
         targets=_targets(target), samples=samples, table=tabletop, seed=seed
@@ -277,7 +277,7 @@ def search(
         picture: Save a view (.png, .pdf or .svg).
 
     Raises:
-        RobotLayoutsError: If an option makes no sense, or no placement is found.
+        RobotLayoutsError: If an option is invalid, or no placement is found.
     """
     if sum(where is not None for where in (table, around, ceiling)) > 1:
         raise UsageError("--table, --around and --ceiling exclude each other; choose one of them")
@@ -321,10 +321,10 @@ def view(layout: LayoutWords, *, page: Page) -> None:
     Raises:
         RobotLayoutsError: If there is no such layout, or it cannot be served or saved.
     """
-    from layouts.viewer import Cell
+    from layouts.viewer import ShownCell
 
     chosen = layout.layout()
-    page.show(lambda: Cell(" ".join([layout.what, *layout.robots]), chosen))
+    page.show(lambda: ShownCell(" ".join([layout.what, *layout.robots]), chosen))
 
 
 def export(

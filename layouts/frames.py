@@ -265,7 +265,7 @@ def check_positive(what: str, value: Any) -> float:
     """Return a distance: a number greater than 0 and of at most `FAR` (m).
 
     Raises:
-        LayoutError: If it is none.
+        LayoutError: If it is not such a number.
     """
     distance = as_float(value)
     if distance is None or not 0 < distance <= FAR:

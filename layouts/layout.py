@@ -119,7 +119,7 @@ class Layout(Arrangement):
 
         Raises:
             LayoutError: If the path ends otherwise.
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
         """
         from layouts.export import write_urdf
 
@@ -141,7 +141,7 @@ class Layout(Arrangement):
 
         Raises:
             LayoutError: If the path ends otherwise.
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             MissingPackageError: If trimesh is not installed.
         """
         from layouts.export import write_drake
@@ -167,14 +167,14 @@ class Layout(Arrangement):
             path: Where to save; must end in ``.xml``. The folder beside it is replaced if it
                 exists.
             visuals: Whether to include what the robots look like. A robot whose visual meshes
-                cannot be had is drawn by its collision shapes; a line on stderr says so.
+                cannot be found is drawn by its collision shapes; a line on stderr says so.
 
         Returns:
             The path of the model.
 
         Raises:
             LayoutError: If the path ends otherwise, or the folder holds something else.
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If trimesh or scipy is not installed.
         """
@@ -203,7 +203,7 @@ class Layout(Arrangement):
 
         Raises:
             LayoutError: If the path ends otherwise.
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If usd-core, trimesh or scipy is not installed.
         """
@@ -231,8 +231,8 @@ class Layout(Arrangement):
             The folder.
 
         Raises:
-            LayoutError: If the folder's name is none of a package, or it holds something else.
-            AssetError: If a robot's files cannot be found or make no sense.
+            LayoutError: If the folder's name is no valid package name, or it holds something else.
+            AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If trimesh or scipy is not installed.
         """
@@ -278,7 +278,7 @@ class Layout(Arrangement):
 
         Looks for robots that collide with each other, with themselves or with tables at their
         keyframes and with joint noise, for keyframes beyond the joint limits, and for targets that
-        nobody reaches; measures distances and shared workspaces. Needs the robots' files.
+        no robot reaches; measures distances and shared workspaces. Needs the robots' files.
 
         Args:
             targets: What some robot must reach, by name or in order: x, y, z of a tool centre
@@ -293,9 +293,9 @@ class Layout(Arrangement):
             The report: ``ok``, ``findings``, a readable ``str`` and ``picture(path)``.
 
         Raises:
-            LayoutError: If an argument makes no sense.
-            AssetError: If no robot's files can be found and make sense. Where only some cannot,
-                a finding says so.
+            LayoutError: If an argument is invalid.
+            AssetError: If no robot's files can be found and read. Where only some cannot, a finding
+                says so.
             DescriptorError: If the robots' descriptors contradict their URDFs.
             MissingPackageError: If python-fcl is not installed.
         """

@@ -250,7 +250,7 @@ def _checked_mode(robot: RobotDescriptor, mode: object) -> str | None:
     """Return a control mode, or those of limbs, as one text; None if there are none.
 
     Raises:
-        LayoutError: If it is none.
+        LayoutError: If it is not a control mode, or a mapping of limbs to control modes.
         UnknownNameError: If the robot has no such mode, or no such limb.
         DescriptorError: If the robot lacks what the mode needs.
     """

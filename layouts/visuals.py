@@ -32,7 +32,7 @@ CELLS = 300  # along the longest side of a mesh that is drawn coarser
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Visual:
     """One mesh of one colour or texture, fixed to a link.
 
     Attributes:
@@ -44,7 +44,7 @@ class Part:
     rgba: Rgba
 
 
-def read_visuals(urdf: Path) -> dict[str, tuple[Part, ...]]:
+def read_visuals(urdf: Path) -> dict[str, tuple[Visual, ...]]:
     """Return what a URDF draws of each link that it draws.
 
     Args:
@@ -59,7 +59,7 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Part, ...]]:
     contents = read_urdf(urdf)
     root, model = parse_urdf(contents, str(urdf)), read_model(contents, str(urdf))
     colours = dict(_named_colours(root, urdf))
-    drawn: dict[str, tuple[Part, ...]] = {}
+    drawn: dict[str, tuple[Visual, ...]] = {}
     for link in root.iterfind("link"):
         shapes = model.visuals.get(link.get("name", ""), ())
         parts = tuple(
@@ -86,7 +86,7 @@ def require_trimesh(what: str) -> None:
         ) from error
 
 
-def coloured(mesh: Any, rgba: Rgba) -> Part:
+def coloured(mesh: Any, rgba: Rgba) -> Visual:
     """Return a trimesh as a part of one colour."""
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
@@ -99,10 +99,10 @@ def coloured(mesh: Any, rgba: Rgba) -> Part:
             alphaMode="BLEND" if rgba[3] < 1 else "OPAQUE",
         )
     )
-    return Part(mesh, rgba)
+    return Visual(mesh, rgba)
 
 
-def simplified(part: Part, cells: int = CELLS) -> Part:
+def simplified(part: Visual, cells: int = CELLS) -> Visual:
     """Return a part whose corners lie on a fine grid, if it has very many triangles.
 
     Corners move by less than 1/300 of the mesh's longest side; by more only if more than
@@ -128,7 +128,7 @@ def simplified(part: Part, cells: int = CELLS) -> Part:
     return coloured(trimesh.Trimesh(places * cell, faces, process=False), part.rgba)
 
 
-def coarse(part: Part) -> Part:
+def coarse(part: Visual) -> Visual:
     """Return the convex hull of a part that has many triangles, for quick pictures.
 
     Corners move by less than 1/80 of its longest side.
@@ -168,7 +168,7 @@ def _colour(visual: Element, urdf: Path, colours: Mapping[str, Rgba]) -> Rgba | 
     return colours.get(material.get("name", "")) if color is None else _rgba(color, urdf)
 
 
-def _visual_parts(shape: UrdfShape, rgba: Rgba | None, urdf: Path) -> Iterator[Part]:
+def _visual_parts(shape: UrdfShape, rgba: Rgba | None, urdf: Path) -> Iterator[Visual]:
     if shape.kind == "mesh":
         yield from _mesh_parts(shape, urdf, shape.origin @ np.diag([*shape.sizes, 1.0]), rgba)
         return
@@ -192,13 +192,13 @@ def _primitive(shape: UrdfShape) -> Any:
             return trimesh.creation.capsule(length, radius, count=[SIDES, SIDES])
 
 
-def _mesh_parts(shape: UrdfShape, urdf: Path, pose: Floats, rgba: Rgba | None) -> Iterator[Part]:
+def _mesh_parts(shape: UrdfShape, urdf: Path, pose: Floats, rgba: Rgba | None) -> Iterator[Visual]:
     path = resolve(shape.file, urdf.as_posix(), os.path.isfile)
     for mesh in load_meshes(path, shape.where, urdf.as_posix()):
         mesh.apply_transform(pose)
         expect_near(mesh.vertices, path, shape.where)
         own = _own_colour(mesh)
-        yield coloured(mesh, rgba or GREY) if own is None else Part(mesh, own)
+        yield coloured(mesh, rgba or GREY) if own is None else Visual(mesh, own)
 
 
 def load_meshes(path: str, where: str, urdf: str | None = None) -> list[Any]:

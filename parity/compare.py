@@ -78,7 +78,7 @@ class Wanted:
     num_envs: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense.
+        """Refuse what is invalid.
 
         Raises:
             TaskError: If something does not.

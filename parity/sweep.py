@@ -81,7 +81,7 @@ def sweep(
         no_video: No film of native and no clip.
 
     Raises:
-        RobotLayoutsError: If the arguments make no sense.
+        RobotLayoutsError: If the arguments are invalid.
     """
     for name, value in (("episodes", episodes), ("workers", workers)):
         if value < 1:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from robot_layouts.core.errors import DescriptorError, UnknownNameError, unknown_name_message
 from robot_layouts.core.schema import check, check_fields
-from robots.commands import COMMANDS, FRAMES, Command
+from robots.commands import COMMANDS, FRAMES, JointCommand
 
 JOINTS_OF_A_POSE = 6  # that an arm needs to choose place and orientation
 
@@ -69,7 +69,7 @@ class JointGroup:
         frame: In which frames a ``delta`` of a TCP pose is; see `robots.commands.FRAMES`.
         root_link: Link whose frame TCP poses are in; the robot's root if None.
         approximate_ik: Whether control of the TCP goes as near to a pose as it gets where it
-            cannot be had: the place first, then the orientation. The default is ManiSkill's way:
+            cannot be reached: position first, then the orientation. The default is ManiSkill's way:
             an arm of six joints or more then stays where it is.
     """
 
@@ -162,7 +162,7 @@ class JointGroup:
         for name in ("multipliers", "offsets"):
             given: tuple[float, ...] = getattr(self, name)
             if given and not self.mimic:
-                raise DescriptorError(f"only a mimic group has {name}; {self.joints} is none")
+                raise DescriptorError(f"only a mimic group has {name}; {self.joints} is not one")
             if given and len(given) != len(self.joints):
                 raise DescriptorError(
                     f"{name} has {len(given)} numbers; the group has joints {self.joints}"
@@ -175,7 +175,7 @@ class JointGroup:
             return
         if not self.mimic or self.delta:
             raise DescriptorError(
-                f"only a mimic group that is driven to places has leaders; {self.joints} is none"
+                f"only a mimic group that is driven to places has leaders; {self.joints} is not one"
             )
         for joint in self.leaders:
             if joint not in self.joints:
@@ -190,7 +190,7 @@ class JointGroup:
 
     def _refuse_bad_commands(self) -> None:
         if self.target and not self.delta:
-            raise DescriptorError(f"only a delta has a target; that of {self.joints} is none")
+            raise DescriptorError(f"only a delta has a target; {self.joints} has no delta")
         if self.command != "position" and (self.mimic or self.held):
             raise DescriptorError(
                 f"{self.joints} take {self.command!r}; a group that is held or mimics takes"
@@ -243,7 +243,7 @@ class JointGroup:
         return COMMANDS[self.command].numbers(self.joints, self.unit)
 
     @property
-    def asks(self) -> Command:
+    def asks(self) -> JointCommand:
         """What the action numbers ask for."""
         return COMMANDS[self.command]
 
@@ -406,7 +406,7 @@ def _held(group: JointGroup) -> JointGroup:
 
 
 def _split_from_groups(groups: dict[str, JointGroup]) -> ActionSplit:
-    split = ActionSplit.__new__(ActionSplit)  # one that nobody drives is no mistake here
+    split = ActionSplit.__new__(ActionSplit)  # here, a group that nothing drives is no error
     split._lay_out(groups)  # pyright: ignore[reportPrivateUsage]
     return split
 

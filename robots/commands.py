@@ -23,7 +23,7 @@ _TURN = ("roll", "pitch", "yaw")
 
 
 @dataclass(frozen=True)
-class Command:
+class JointCommand:
     """What the action numbers of a joint group ask for.
 
     Attributes:
@@ -68,14 +68,14 @@ class Command:
         return tuple(named)
 
 
-COMMANDS: Mapping[str, Command] = MappingProxyType(
+COMMANDS: Mapping[str, JointCommand] = MappingProxyType(
     {
-        "position": Command(positions=True),
-        "velocity": Command(velocities=True),
-        "position_velocity": Command(positions=True, velocities=True),
-        "tcp_position": Command(place=True),
-        "tcp_pose": Command(place=True, turn=True),
-        "base_velocity": Command(drive=True),
+        "position": JointCommand(positions=True),
+        "velocity": JointCommand(velocities=True),
+        "position_velocity": JointCommand(positions=True, velocities=True),
+        "tcp_position": JointCommand(place=True),
+        "tcp_pose": JointCommand(place=True, turn=True),
+        "base_velocity": JointCommand(drive=True),
     }
 )
 """What a `robots.JointGroup` can be asked for, by name."""

@@ -68,7 +68,7 @@ def read_mode(text: str) -> str | dict[str, str]:
     names = [arm.strip() for arm, _ in pairs]
     if not all(arm.strip() and mode.strip() for arm, mode in pairs) or len(set(names)) < len(names):
         raise DescriptorError(
-            f"control mode {shown(text)} makes no sense; a name such as {CONTROL_MODES[0]!r} is"
+            f"control mode {shown(text)} is invalid; a name such as {CONTROL_MODES[0]!r} is"
             " needed, or one for each arm: 'left=pd_ee_pose,right=pd_joint_pos'"
         )
     return {arm.strip(): mode.strip() for arm, mode in pairs}

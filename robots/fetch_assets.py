@@ -58,7 +58,7 @@ def fetch(
             or main).
 
     Raises:
-        RobotLayoutsError: If a robot does not exist, or a file cannot be had.
+        RobotLayoutsError: If a robot does not exist, or no source has a file.
     """
     if offline and source in ONLINE_SOURCES:
         raise UsageError(f"--source {source} needs the network, which --offline rules out")

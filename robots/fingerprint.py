@@ -25,7 +25,7 @@ def asset_fingerprint(source: UrdfSource) -> str:
         source: Where the URDF comes from; files are fetched and checked as for a simulation.
 
     Raises:
-        AssetError: If a file cannot be had or read.
+        AssetError: If a file cannot be found or read.
     """
     lines = (f"{digest}  {name}\n" for name, digest in _checksums(source))
     return hashlib.sha256("".join(lines).encode()).hexdigest()
@@ -35,7 +35,7 @@ def asset_checksums(source: UrdfSource) -> dict[str, str]:
     """Return the SHA-256, in hex, of each of these files, by its path relative to the URDF.
 
     Raises:
-        AssetError: If a file cannot be had or read.
+        AssetError: If a file cannot be found or read.
     """
     return dict(_checksums(source))
 

@@ -70,7 +70,7 @@ def guess_descriptor(
         MissingPackageError: If a name is given and robot_descriptions is not installed, a template
             and xacro is not, or an MJCF and MuJoCo is not.
         UnknownNameError: If robot_descriptions has no robot of that name, or the SRDF names a
-            group, link or joint that there is not.
+            group, link or joint that does not exist.
     """
     path = _find(path_or_name, form)
     opened = None if folder is None else str(absolute(folder, "folder"))

@@ -93,7 +93,7 @@ def with_gripper(
         DescriptorError: If the present fingers carry parts of the arm, the new ones hang on the arm
             that should lend them, or a robot has limbs.
         UnknownNameError: If there is no such link or robot.
-        AssetError: If files cannot be found or make no sense.
+        AssetError: If files cannot be found or are invalid.
     """
     robot = _robot(robot)
     _refuse_limbs(robot, "take another gripper")
@@ -144,7 +144,7 @@ def with_tool(
     Raises:
         DescriptorError: If something moves in the tool, or names are taken.
         UnknownNameError: If there is no such link.
-        AssetError: If files cannot be found or make no sense.
+        AssetError: If files cannot be found or are invalid.
     """
     source = local_source(tool) if isinstance(tool, str | os.PathLike) else tool
     model = _model(source)
@@ -207,7 +207,7 @@ def on_body(
     Raises:
         DescriptorError: If there is no robot, one has limbs, or something moves in the body.
         UnknownNameError: If there is no such link or robot.
-        AssetError: If files cannot be found or make no sense.
+        AssetError: If files cannot be found or are invalid.
     """
     if not mounts:
         raise DescriptorError("nothing stands on the body; name at least one robot")

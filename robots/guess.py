@@ -19,7 +19,7 @@ from robots.bodies.hulls import Hull, counted_pairs, read_hulls
 from robots.bodies.overlaps import guess_allowed, overlapping
 from robots.descriptor import RobotDescriptor, UrdfSource
 from robots.guessing import words
-from robots.guessing.anatomy import Anatomy, Limb, find_anatomy
+from robots.guessing.anatomy import Anatomy, LimbJoints, find_anatomy
 from robots.guessing.doubt import Doubt
 from robots.guessing.drives import Drives, read_masses
 from robots.guessing.fingertips import Fingertips, find_fingers, find_material
@@ -29,8 +29,7 @@ from robots.guessing.hints import NOTHING, Hints, known_anatomy, known_tip, rena
 from robots.guessing.posture import Posture, PostureSearch
 from robots.guessing.stance import Stance
 from robots.guessing.tool import BETWEEN, EXACT, Tool, find_base, find_reach, find_tool
-from robots.parts import Fingers, Vector3
-from robots.parts import Limb as LimbDescription
+from robots.parts import Fingers, Limb, Vector3
 from robots.urdf.cleaning.xacro_files import expand, template_of
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
@@ -226,7 +225,7 @@ def _given_tool(guessed: Tool, overrides: Mapping[str, Any]) -> Tool:
     return replace(tool, reason=f"TCP: by {at}, as given, on the link {tool.link}", **given)
 
 
-def _known_tool(model: UrdfModel, limb: Limb, hints: Hints) -> Tool | None:
+def _known_tool(model: UrdfModel, limb: LimbJoints, hints: Hints) -> Tool | None:
     """Return the tool centre point that is known as a limb's end, if any is."""
     tip = known_tip(model, limb, hints)
     which = f"{limb.name} TCP" if limb.name else "TCP"
@@ -260,17 +259,17 @@ def _wheels(parts: _Parts) -> tuple[str, ...]:
     )
 
 
-def _fingers(parts: _Parts, limb: Limb) -> tuple[Fingers | None, str]:
+def _fingers(parts: _Parts, limb: LimbJoints) -> tuple[Fingers | None, str]:
     postures = parts.grippers[limb.name].postures if limb.fingers else ()
     return find_fingers(limb, parts.tips.get(limb.name), postures)
 
 
-def _limbs(parts: _Parts, rest: Mapping[str, float]) -> dict[str, LimbDescription]:
+def _limbs(parts: _Parts, rest: Mapping[str, float]) -> dict[str, Limb]:
     """Return the limbs of a robot that has several."""
-    limbs: dict[str, LimbDescription] = {}
+    limbs: dict[str, Limb] = {}
     for limb in parts.anatomy.limbs if len(parts.anatomy.limbs) > 1 else ():
         tool, base = parts.tools[limb.name], find_base(parts.model, limb, rest)
-        limbs[limb.name] = LimbDescription(
+        limbs[limb.name] = Limb(
             tool.link,
             find_reach(parts.model, limb, tool, rest, base)[0],
             base,

@@ -44,7 +44,7 @@ class GripperMaterial:
     patch_radius: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse links that are none, and numbers that no contact has."""
+        """Refuse invalid links, and numbers that no contact has."""
         check_fields(self, DescriptorError)
         expect(bool(self.links), "GripperMaterial: links is empty; name the links that touch")
         expect_different("GripperMaterial: links", self.links)
@@ -194,7 +194,7 @@ class Home:
     keyframe: str = "rest"
 
     def __post_init__(self) -> None:
-        """Refuse a pose that is none."""
+        """Refuse an invalid pose."""
         check_fields(self, DescriptorError)
         expect_unit("Home: quaternion", self.quaternion, DescriptorError)
 
@@ -223,7 +223,7 @@ class Limb:
     groups: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a reach that is none, and links that are named twice."""
+        """Refuse an invalid reach, and links that are named twice."""
         check_fields(self, DescriptorError)
         expect(self.reach > 0, f"Limb: reach is {self.reach} m; it must be positive")
         expect_different("Limb: tcp_position_links", self.tcp_position_links)
@@ -274,7 +274,7 @@ def among(*groups: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
 
 
 def share_out(limbs: Mapping[str, Limb], split: ActionSplit) -> dict[str, str | None]:
-    """Return whose each joint group is: a limb's, `BODY`'s, or nobody's if it is held.
+    """Return the owner of each joint group: a limb, `BODY`, or None if the group is held.
 
     Args:
         limbs: The limbs by name.
@@ -300,7 +300,7 @@ def share_out(limbs: Mapping[str, Limb], split: ActionSplit) -> dict[str, str | 
 def _give(owners: _Owners, group: str, limb: str, limbs: Mapping[str, Limb]) -> None:
     if group not in owners:
         raise DescriptorError(
-            f"limb {limb!r} has a joint group {group!r}, which there is not; the groups are"
+            f"limb {limb!r} has a joint group {group!r}, which does not exist; the groups are"
             f" {', '.join(owners)}"
         )
     if owners[group] in limbs:

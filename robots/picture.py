@@ -71,7 +71,7 @@ def save_picture(
         The path of the picture.
 
     Raises:
-        AssetError: If its files cannot be found or make no sense.
+        AssetError: If its files cannot be found or are invalid.
         DescriptorError: If the ending names no supported format.
         MissingPackageError: If matplotlib or python-fcl is not installed.
     """
@@ -86,7 +86,7 @@ def draw(robot: RobotDescriptor, notes: Sequence[str] = ()) -> Figure:
         notes: Further lines to write beneath it.
 
     Raises:
-        AssetError: If its files cannot be found or make no sense.
+        AssetError: If its files cannot be found or are invalid.
         MissingPackageError: If matplotlib or python-fcl is not installed.
     """
     model, limbs = load_model(robot), _limbs(robot)

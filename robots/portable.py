@@ -61,10 +61,7 @@ def numpy_versions() -> tuple[str, ...]:
     try:
         from numpy._core._multiarray_umath import __cpu_dispatch__
     except ImportError:
-        try:
-            from numpy.core._multiarray_umath import __cpu_dispatch__
-        except ImportError:
-            raise RobotLayoutsError("this NumPy does not tell what processors it knows") from None
+        raise RobotLayoutsError("this NumPy does not tell what processors it knows") from None
     return tuple(__cpu_dispatch__)
 
 

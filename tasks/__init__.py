@@ -17,6 +17,7 @@ Writing a task (functions of arrays are in `tasks.maths`):
     TaskEnv: What `make` returns: environments that step a task.
     register_task: Gives it its names.
     Needs: What a place needs of the robot that stands there.
+    Fit: How its places and sizes suit the robots that it is made with, if it ``fits_robots``.
     Cube, Goal, Table, Area, …: Bodies that it declares, and where they begin.
     State, World, EpisodeRandom: What its methods are given.
     closeness, stillness, lies_on, …: Terms of rewards and of success.
@@ -63,6 +64,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "Distractors",
     "EpisodeRandom",
     "Finish",
+    "Fit",
     "Fixed",
     "Friction",
     "Goal",

@@ -35,7 +35,7 @@ class RecordedCell:
         """Return the arguments of `tasks.make` that are given.
 
         Raises:
-            RobotLayoutsError: If there is no such robot or layout, or a word makes no sense.
+            RobotLayoutsError: If there is no such robot or layout, or a value is invalid.
         """
         chosen: dict[str, Any] = {}
         if self.robots:  # first, as the layout may hold robots of modules that these words name
@@ -48,7 +48,7 @@ class RecordedCell:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cell(RecordedCell):
+class CellOptions(RecordedCell):
     """Which robots stand where, and what varies.
 
     Attributes:

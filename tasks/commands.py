@@ -12,7 +12,7 @@ from robot_layouts.core.cli import File, Word
 from robot_layouts.core.commands import print_error
 from robot_layouts.core.progress import Progress
 from robots import RobotLayoutsError, TaskError
-from tasks.cell_options import Cell
+from tasks.cell_options import CellOptions
 from tasks.description import (
     TaskFacts,
     declared_facts,
@@ -59,7 +59,7 @@ def print_list(modules: Sequence[Annotated[str, Word("MODULE")]] = ()) -> int:
     return 1 if failures else 0
 
 
-def print_description(task: str, *, cell: Cell) -> None:
+def print_description(task: str, *, cell: CellOptions) -> None:
     """Print everything about a task.
 
     Args:
@@ -76,7 +76,7 @@ def print_description(task: str, *, cell: Cell) -> None:
     env.close()
 
 
-def view(task: str, *, seed: int = 0, cell: Cell, page: Page) -> None:
+def view(task: str, *, seed: int = 0, cell: CellOptions, page: Page) -> None:
     """Look at a task in a browser.
 
     Args:
@@ -101,7 +101,7 @@ def preview(
     draws: int = 12,
     seed: int = 0,
     camera: Annotated[str, Word("NAME")] | None = None,
-    cell: Cell,
+    cell: CellOptions,
 ) -> None:
     """Save one picture of several draws of a task.
 

@@ -210,6 +210,8 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
     ):
         rows.add_row(name, value or UNKNOWN)
     yield rows
+    if cls.fits_robots:
+        yield f"\nFits its robots: {fit_text(env)}"
     yield f"\nLayout: {env.layout}\n"
     yield action_sentence(env.layout)
     yield action_table(env.layout)
@@ -217,6 +219,17 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
     yield observation_table(env.observation_slices, env.observer.senses)
     yield "Cameras, with obs_mode='rgb' or 'rgbd'; with images, only sensed parts are observed"
     yield camera_table(cameras_of(env.layout, cls.cameras))
+
+
+def fit_text(env: TaskEnv) -> str:
+    """Return in words how a task's sizes and places fit the robots that it was made with."""
+    fit = env.task.fit
+    if fit.as_declared:
+        return "these are its own; every length is as declared"
+    return (
+        f"every length is {fit.scale:.2f} times as declared, and its frame lies at"
+        f" ({fit.x:.2f}, {fit.y:.2f}) m, turned by {degrees(fit.yaw):.0f}°"
+    )
 
 
 def _full_name(cls: type[MultiRobotTask]) -> list[str]:

@@ -90,7 +90,7 @@ class PlayedEpisode(Episode):
         seed: int,
         actions: Sequence[NDArray[np.float32]],
         states: States,
-        moments: Sequence[Moment],
+        moments: Sequence[StepResult],
         **others: Any,
     ) -> PlayedEpisode:
         """Return the episode of T steps, T of 1 or more.
@@ -126,7 +126,7 @@ class PlayedEpisode(Episode):
         return Score(self.solved, total, len(self.actions), self.reason)
 
 
-class Moment(NamedTuple):
+class StepResult(NamedTuple):
     """What a reset or a step returned, of one environment.
 
     Attributes:
@@ -155,7 +155,7 @@ def moments(
     most: int,
     *,
     start: Mapping[str, Mapping[str, Any]] | None = None,
-) -> Generator[Moment]:
+) -> Generator[StepResult]:
     """Begin an episode in a freshly built world, then take a step whenever asked for one.
 
     Args:
@@ -178,14 +178,14 @@ def moments(
     observation, _ = task.reset(seed, options=REBUILT)
     if start is not None:
         task.set_state_dict(start)
-    yield Moment(observation)
+    yield StepResult(observation)
     for _ in range(most):
         moment = take_step(task, policy(observation))
         observation = moment.observation
         yield moment
 
 
-def take_step(task: TaskEnv, action: Any) -> Moment:
+def take_step(task: TaskEnv, action: Any) -> StepResult:
     """Take a control step in a task with one environment, and return what it returned.
 
     Raises:
@@ -196,7 +196,7 @@ def take_step(task: TaskEnv, action: Any) -> Moment:
     seconds = perf_counter() - began
     success, over, late = bool(info["success"]), bool(terminated), bool(truncated)
     elapsed = int(info["elapsed_steps"])
-    return Moment(observation, reward.item(), success, over, late, seconds, elapsed)
+    return StepResult(observation, reward.item(), success, over, late, seconds, elapsed)
 
 
 def open_loop(actions: Iterable[Any]) -> Policy:
@@ -212,10 +212,10 @@ class EpisodeTape:
         """Begin with the present state, that after the reset with a seed."""
         self._task, self._seed, self._states = task, seed, task.begin_tape()
         self._actions: list[NDArray[np.float32]] = []
-        self._moments: list[Moment] = []
+        self._moments: list[StepResult] = []
         task.write_tape(self._states)
 
-    def add(self, action: Any, moment: Moment) -> None:
+    def add(self, action: Any, moment: StepResult) -> None:
         """Add a step that was just taken: its action, (A,), and what it returned."""
         self._actions.append(np.array(action, np.float32))
         self._moments.append(moment._replace(observation=None))

@@ -55,7 +55,7 @@ def new_task(
         out: Folder of the files.
 
     Raises:
-        RobotLayoutsError: If a word makes no sense, or a file is there already.
+        RobotLayoutsError: If an argument is invalid, or a file is there already.
     """
     module, task_id = _names(name)
     texts = {

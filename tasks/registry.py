@@ -42,6 +42,7 @@ CATALOGUE = {
     "RollBall-v1": "tasks.maniskill.roll_ball:RollBall",
     "StackCube-v1": "tasks.maniskill.stack_cube:StackCube",
     "StackPyramid-v1": "tasks.maniskill.stack_pyramid:StackPyramid",
+    "TwoRobotHandOver-v1": "tasks.originals.two_robot_hand_over:TwoRobotHandOver",
     "TwoRobotLiftBar-v1": "tasks.originals.two_robot_lift_bar:TwoRobotLiftBar",
     "TwoRobotPickCube-v1": "tasks.maniskill.two_robot_pick_cube:TwoRobotPickCube",
     "TwoRobotPushPick-v1": "tasks.originals.two_robot_push_pick:TwoRobotPushPick",

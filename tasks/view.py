@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts.viewer import Cell, Motion, Thing
-from layouts.visuals import Part, coloured, load_meshes
+from layouts.viewer import ShownCell, ShownMotion, Thing
+from layouts.visuals import Visual, coloured, load_meshes
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
 from robot_layouts.simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from robots import TaskError
@@ -20,7 +20,7 @@ PLANE_SIZE = 6.0  # m, of what is drawn of an infinite plane
 ROOT = 13  # numbers of a row before the joints: the root's pose and velocities
 
 
-def task_cell(task: TaskEnv, title: str, motion: Motion | None = None) -> Cell:
+def task_cell(task: TaskEnv, title: str, motion: ShownMotion | None = None) -> ShownCell:
     """Return what a page shows of a task as it stands now, in its first environment.
 
     Args:
@@ -36,7 +36,7 @@ def task_cell(task: TaskEnv, title: str, motion: Motion | None = None) -> Cell:
     drawn = {name: live_thing(task, name) for name in world.bodies}
     things = {name: thing for name, thing in drawn.items() if thing is not None}
     start = {name: state.qpos(name)[0].astype(float) for name in task.layout}
-    return Cell(title, task.standing(), things, motion, start)
+    return ShownCell(title, task.standing(), things, motion, start)
 
 
 def live_thing(task: TaskEnv, name: str) -> Thing | None:
@@ -51,7 +51,7 @@ def live_thing(task: TaskEnv, name: str) -> Thing | None:
     return Thing(parts, pose) if parts else None
 
 
-def recorded_motion(task: TaskEnv, states: Mapping[str, Mapping[str, NDArray[Any]]]) -> Motion:
+def recorded_motion(task: TaskEnv, states: Mapping[str, Mapping[str, NDArray[Any]]]) -> ShownMotion:
     """Return the motion that recorded states describe.
 
     Args:
@@ -74,15 +74,15 @@ def recorded_motion(task: TaskEnv, states: Mapping[str, Mapping[str, NDArray[Any
         for name, rows in states.get("actors", {}).items()
         if name in world.bodies and body_parts(world.bodies[name].shapes)
     }
-    return Motion(1 / task.scenario.control_frequency, qpos, poses)
+    return ShownMotion(1 / task.scenario.control_frequency, qpos, poses)
 
 
-def body_parts(shapes: tuple[Shape, ...]) -> tuple[Part, ...]:
+def body_parts(shapes: tuple[Shape, ...]) -> tuple[Visual, ...]:
     """Return what a body looks like, in its own frame; shapes that are not drawn are left out."""
     return tuple(part for shape in shapes if shape.visible for part in _parts(shape))
 
 
-def _parts(shape: Shape) -> list[Part]:
+def _parts(shape: Shape) -> list[Visual]:
     pose = pose_matrix(shape.position, shape.quaternion)
     meshes = _meshes(shape)
     for mesh in meshes:

@@ -38,6 +38,7 @@ from tasks.language.bodies import (
     Target,
     WideTable,
 )
+from tasks.language.fitting import Fit
 from tasks.language.needs import Needs
 from tasks.language.props import (
     BLUE,

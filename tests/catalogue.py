@@ -48,7 +48,7 @@ def _marks(robot: str, quick: bool) -> list[pytest.MarkDecorator]:
 
 @functools.cache
 def optional_problem() -> str | None:
-    """Say why the files of optional robots cannot be had here, or None if they can."""
+    """Say why the files of optional robots cannot be found here, or None if they can."""
     for robot in filter(is_optional, CATALOGUE):
         try:
             RobotRegistry.load(robot).urdf.locate()

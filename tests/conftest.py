@@ -62,7 +62,7 @@ PROBLEMS = {"native": lambda: native_problem(), "browser": lambda: browser_probl
 
 
 def optional_problem() -> str | None:
-    """Say why robots of an optional package cannot be had, or None if they can."""
+    """Say why robots of an optional package cannot be found, or None if they can."""
     from tests.catalogue import optional_problem as problem
 
     return problem()
@@ -77,6 +77,23 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     for marker, find_problem in {**PROBLEMS, "example_robots": optional_problem}.items():
         if item.get_closest_marker(marker) and (problem := find_problem()):
             pytest.skip(problem)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_device() -> Iterator[None]:
+    """Let everything draw on native's device: a process can draw on no more than one."""
+    if importlib.util.find_spec("mani_skill") is None:
+        yield
+        return
+    import sapien.render
+    from sapien import Device
+
+    made = sapien.render.RenderSystem
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            sapien.render, "RenderSystem", lambda device=None: made(device or Device("cpu"))
+        )
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -6,6 +6,7 @@ import gc
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,20 @@ import torch
 from numpy.typing import NDArray
 
 import tasks
-from benchmarks.bench.measurement import Measurement, Sample, Settings, SomeValue, measured
+from benchmarks.bench.measurement import (
+    BenchmarkError,
+    Measurement,
+    Sample,
+    Settings,
+    SomeValue,
+    measured,
+)
 from benchmarks.bench.worlds import crowd, make_crowd, make_pile
 from parity.native import make_native, native_action
 from robot_layouts.data.recording.recorder import Recorder
+from robot_layouts.experts import find_expert, list_experts
 from robot_layouts.simulation.rendering import vulkan_problem
+from robots import TaskError
 from tasks import (
     CameraShift,
     Distractors,
@@ -36,6 +46,8 @@ from tasks import (
 from tasks.episode import REBUILT, play
 
 STEP, PHYSICS, HERE, NATIVE = "step", "physics alone", "here", "native"  # series
+EXPERT, RANDOM = "expert's actions", "random actions"  # series, too
+SEEDS = 10  # of which an expert must solve one
 RESETS = 5  # of a sample
 EPISODE_STEPS = 60  # of an episode that is recorded
 
@@ -74,7 +86,14 @@ LOOKS = {
 
 
 class Played:
-    """A task whose step is timed under random actions, and the physics of the same motion."""
+    """A task whose step is timed under random actions, and the physics of the same motion.
+
+    Attributes:
+        env: The task.
+        options: Of the reset before every round.
+    """
+
+    options: Mapping[str, Any] | None = None
 
     def __init__(self, env: TaskEnv, settings: Settings) -> None:
         """Take a task; its first action is played now, as building leaves work to it."""
@@ -84,25 +103,66 @@ class Played:
     def step(self, number: int) -> float:
         """Return the time of a whole step, for each environment (µs)."""
         actions = [torch.from_numpy(action) for action in self.actions(number)]
-        self.env.reset(number)
+        self.env.reset(self.seed(number), options=self.options)
         start = self._settings.clock.now()
         for action in actions:
             self.env.step(action)
-        return self._each(self._settings.clock.now() - start)
+        return self._each(self._settings.clock.now() - start, len(actions))
 
     def physics(self, number: int) -> float:
         """Return the time of its physics alone, for each environment (µs)."""
-        self.env.reset(number)
+        actions = self.actions(number)
+        self.env.reset(self.seed(number), options=self.options)
         step, clock = self.env.simulation.timed_step, self._settings.clock.now
-        return self._each(sum(step(action, clock) for action in self.actions(number)))
+        return self._each(sum(step(action, clock) for action in actions), len(actions))
 
     def actions(self, number: int) -> NDArray[np.float32]:
         """Return the actions of a round, shape (steps, N, A)."""
         width = self.env.single_action_space.shape[0]
         return random_actions(number, self._settings.steps, self.env.num_envs, width)
 
-    def _each(self, seconds: float) -> float:
-        return seconds / (self._settings.steps * self.env.num_envs) * 1e6
+    def seed(self, number: int) -> int:
+        """Return the seed of a round's episode."""
+        return number
+
+    def _each(self, seconds: float, steps: int) -> float:
+        return seconds / (steps * self.env.num_envs) * 1e6
+
+
+class Worked(Played):
+    """A task of one environment whose step is timed under an expert's actions.
+
+    Every round plays the same episode, which succeeds, in a freshly built world.
+    """
+
+    options = REBUILT
+
+    def __init__(self, env: TaskEnv, settings: Settings) -> None:
+        """Take a task, and find an episode.
+
+        Raises:
+            BenchmarkError: If the expert solves none.
+            UnknownNameError: If the task has no expert.
+        """
+        expert = find_expert(env.task_id)
+        for self._seed in range(SEEDS):
+            try:
+                self._actions = expert(env, self._seed)[:, None]
+            except TaskError:
+                continue
+            super().__init__(env, settings)
+            self.step(0)
+            if env.task.evaluate(env.simulation.read())["success"].all():
+                return
+        raise BenchmarkError(f"the expert of {env.task_id} solves none of the seeds to {SEEDS - 1}")
+
+    def actions(self, number: int) -> NDArray[np.float32]:
+        """Return the actions of the episode, shape (steps, 1, A)."""
+        return self._actions
+
+    def seed(self, number: int) -> int:
+        """Return the seed of the episode."""
+        return self._seed
 
 
 def random_actions(seed: int, steps: int, envs: int, numbers: int) -> NDArray[np.float32]:
@@ -112,10 +172,15 @@ def random_actions(seed: int, steps: int, envs: int, numbers: int) -> NDArray[np
 
 
 def step(settings: Settings) -> Measurement:
-    """A step of one environment."""
+    """A step of one environment, under an expert's actions and under random ones."""
     envs = {task_id: tasks.make(task_id) for task_id in settings.task}
+    played: dict[str, dict[str, Played]] = {EXPERT: {}, RANDOM: {}}
+    for task_id, env in envs.items():
+        if task_id in list_experts():
+            played[EXPERT][task_id] = Worked(env, settings)
+        played[RANDOM][task_id] = Played(env, settings)
     title = "One step of one environment, by task"
-    return _beside_physics(settings, "step", title, "task", {STEP: envs})
+    return _timed_beside_physics(settings, "step", title, "task", played)
 
 
 def environments(settings: Settings) -> Measurement:
@@ -216,25 +281,36 @@ def looks(settings: Settings) -> Measurement:
 
 
 def step_beside_native(settings: Settings) -> Measurement:
-    """A step of one environment of each clone, native's and ours."""
+    """A step of one environment of each clone, native's and ours, under both kinds of actions."""
 
     def variants(native: Any, ours: TaskEnv) -> dict[str, Sample]:
-        played = Played(ours, settings)
-
-        def native_steps(number: int) -> float:
-            actions = [native_action(native, action[0]) for action in played.actions(number)]
-            native.reset(seed=number)
-            start = settings.clock.now()
-            for action in actions:
-                native.step(action)
-            return (settings.clock.now() - start) / len(actions) * 1e6
-
-        return {HERE: played.step, NATIVE: native_steps, PHYSICS: played.physics}
+        found: dict[str, Sample] = {}
+        for kind, cls in ((EXPERT, Worked), (RANDOM, Played)):
+            played = cls(ours, settings)
+            found[f"{HERE}, {kind}"] = played.step
+            found[f"{NATIVE}, {kind}"] = partial(_native_steps, native, played, settings)
+            found[f"{PHYSICS}, {kind}"] = played.physics
+        return found
 
     title = "One step with observation, reward and success"
     samples = _beside_native(settings, variants)
-    ratios = ((NATIVE, HERE), (HERE, PHYSICS))
-    return measured("step", title, "µs per step", "task", samples, (PHYSICS,), ratios)
+    floors = tuple(f"{PHYSICS}, {kind}" for kind in (EXPERT, RANDOM))
+    ratios = tuple(
+        (f"{over}, {kind}", f"{under}, {kind}")
+        for kind in (EXPERT, RANDOM)
+        for over, under in ((NATIVE, HERE), (HERE, PHYSICS))
+    )
+    return measured("step", title, "µs per step", "task", samples, floors, ratios)
+
+
+def _native_steps(native: Any, played: Played, settings: Settings, number: int) -> float:
+    """Return the time of a step of native's environment under the same actions (µs)."""
+    actions = [native_action(native, action[0]) for action in played.actions(number)]
+    native.reset(seed=played.seed(number), options=played.options)
+    start = settings.clock.now()
+    for action in actions:
+        native.step(action)
+    return (settings.clock.now() - start) / len(actions) * 1e6
 
 
 def reset_beside_native(settings: Settings) -> Measurement:
@@ -275,16 +351,33 @@ def _beside_physics(
     variable: str,
     envs: Mapping[str, Mapping[SomeValue, TaskEnv]],
 ) -> Measurement:
+    """Time steps under random actions, and their physics."""
+    played = {
+        series: {value: Played(env, settings) for value, env in at_values.items()}
+        for series, at_values in envs.items()
+    }
+    return _timed_beside_physics(settings, name, title, variable, played)
+
+
+def _timed_beside_physics(
+    settings: Settings,
+    name: str,
+    title: str,
+    variable: str,
+    played: Mapping[str, Mapping[SomeValue, Played]],
+) -> Measurement:
     """Time steps and physics; one series is beside `PHYSICS`, several are each beside its own."""
-    floors = {series: PHYSICS if len(envs) == 1 else f"{series}, physics" for series in envs}
+    floors = {series: PHYSICS if len(played) == 1 else f"{series}, physics" for series in played}
     variants: dict[tuple[str, SomeValue], Sample] = {}
-    for series, at_values in envs.items():
-        for value, env in at_values.items():
-            played = Played(env, settings)
-            variants[series, value] = played.step
-            variants[floors[series], value] = played.physics
-    samples, ratios = settings.interleave(variants), tuple(floors.items())
-    return measured(name, title, "µs per step", variable, samples, tuple(floors.values()), ratios)
+    for series, at_values in played.items():
+        for value, each in at_values.items():
+            variants[series, value] = each.step
+            variants[floors[series], value] = each.physics
+    samples = settings.interleave(variants)
+    floors = {series: floor for series, floor in floors.items() if played[series]}
+    return measured(
+        name, title, "µs per step", variable, samples, tuple(floors.values()), tuple(floors.items())
+    )
 
 
 def _rebuild(env: TaskEnv) -> Callable[[int], object]:

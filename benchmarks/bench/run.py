@@ -71,7 +71,7 @@ def bench(
         record: Keep all of it, beside native, in docs/benchmarks.json for the documentation.
 
     Raises:
-        RobotLayoutsError: If it makes no sense, or nothing can be recorded.
+        RobotLayoutsError: If an option is invalid, or nothing can be recorded.
     """
     own_tasks = settings.task != DEFAULTS.task
     if record and (only or own_tasks or not native):

@@ -85,7 +85,7 @@ def gallery(
 ) -> int:
     """Write a page for every task and every robot, from the code and what was measured.
 
-    Exit code: 0; 1 if a page is not what would be written, or robot files cannot be had.
+    Exit code: 0; 1 if a page is not what would be written, or robot files cannot be found.
 
     Args:
         names: Tasks and robots to measure or draw (all).
@@ -126,7 +126,7 @@ def _read() -> Record:
 
 
 def _each(names: Sequence[str], do: Callable[[str], object]) -> bool:
-    """Do something for each name; those whose files cannot be had are left out, and said."""
+    """Do something for each name; those whose files cannot be found are left out, and said."""
     complete = True
     for name in tqdm(names, disable=None):
         try:
@@ -152,7 +152,7 @@ def read_robot(name: str) -> Record:
     """Return what the files of a robot say: the URDF's SHA-256, and its joints that move.
 
     Raises:
-        AssetError: If its files cannot be had.
+        AssetError: If its files cannot be found.
     """
     urdf = RobotRegistry.load(name).urdf.locate()
     fields = ("name", "type", "unit", "lower", "upper", "effort", "velocity", "mimics")
@@ -172,7 +172,7 @@ def play_task(task_id: str, episodes: int = EPISODES) -> Record:
 
     Raises:
         TaskError: If it has no expert.
-        AssetError: If robot files cannot be had.
+        AssetError: If robot files cannot be found.
     """
     env = tasks.make(task_id)
     observation = [
@@ -243,7 +243,7 @@ def all_pages(record: Record, folder: Path) -> dict[str, str]:
 
 
 def complaints(record: Record, folder: Path) -> Iterator[str]:
-    """Yield what is stale or missing, and the command that mends it.
+    """Yield what is stale or missing, and the command that fixes it.
 
     Raises:
         RecordError: If the record lacks a task or a robot.

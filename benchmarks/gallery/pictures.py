@@ -141,7 +141,7 @@ class Artist:
 
         Raises:
             RecordError: If the record has no such episode.
-            AssetError: If robot files cannot be had.
+            AssetError: If robot files cannot be found.
             UnwritableFileError: If the picture cannot be written.
         """
         if name not in ROBOTS:
@@ -170,7 +170,7 @@ def portrait(robot: RobotDescriptor) -> tuple[Simulation, Picture]:
         The world that it stands in, and its picture.
 
     Raises:
-        AssetError: If its files cannot be had, or it cannot be drawn.
+        AssetError: If its files cannot be found, or it cannot be drawn.
     """
     turned = normalised(multiplied(yaw_quaternion(FACING), robot.home.quaternion))
     layout = Layout({robot.name: Placement(robot, (0.0, 0.0, 0.0), turned)})
@@ -203,7 +203,7 @@ def film(task_id: str, seed: int) -> tuple[TaskEnv, list[Picture]]:
 
     Raises:
         TaskError: If the expert finds no plan.
-        AssetError: If robot files cannot be had.
+        AssetError: If robot files cannot be found.
     """
     planning, points = tasks.make(task_id), list[Floats]()
     try:
@@ -296,20 +296,20 @@ def is_optional(robot: RobotDescriptor) -> bool:
 
 
 def can_be_drawn(robot: RobotDescriptor) -> bool:
-    """Tell whether all its visual meshes can be had."""
+    """Tell whether all its visual meshes can be found."""
     package, urdf = files_of(robot)
     return urdf not in package.undrawable
 
 
 def seen_as_shapes(robot: RobotDescriptor, folder: Path) -> RobotDescriptor:
-    """Return a robot that looks like its collision shapes, as its visual meshes cannot be had.
+    """Return a robot that looks like its collision shapes, as its visual meshes cannot be found.
 
     Args:
         robot: The robot.
         folder: Where copies of its files go.
 
     Raises:
-        AssetError: If its files cannot be had.
+        AssetError: If its files cannot be found.
     """
     source = robot.urdf.locate()
     package, urdf = files_of(robot)

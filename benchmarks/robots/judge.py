@@ -114,7 +114,7 @@ class Expected:
     reach: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a kind that there is not."""
+        """Refuse an unknown kind."""
         if self.kind not in KINDS:
             raise ValueError(f"kind is {self.kind!r}; it must be one of {', '.join(KINDS)}")
 
@@ -139,7 +139,7 @@ def read_expectations(path: Path) -> dict[str, Expected]:
     """Return what a file expects, by patterns of SOURCE/PATH.
 
     Raises:
-        RecordError: If it cannot be read, or makes no sense.
+        RecordError: If it cannot be read, or is invalid.
     """
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))

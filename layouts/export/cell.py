@@ -219,7 +219,7 @@ class ExportedCell:
                 them is drawn by its collision shapes; a notice says so.
 
         Raises:
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
         """
         sources: dict[RobotDescriptor, RobotSource] = {}

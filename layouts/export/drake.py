@@ -14,7 +14,7 @@ import yaml
 
 from layouts.export.files import Names, replaced_folder
 from layouts.export.urdf import COPIED, base_link
-from layouts.visuals import Part, load_meshes, read_visuals, require_trimesh, simplified
+from layouts.visuals import Visual, load_meshes, read_visuals, require_trimesh, simplified
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots import LayoutError, RobotDescriptor
@@ -107,7 +107,7 @@ def _is_own(found: Path) -> bool:
 
 
 def _write_model(
-    urdf: Path, visuals: Mapping[str, tuple[Part, ...]], folder: Path, name: str
+    urdf: Path, visuals: Mapping[str, tuple[Visual, ...]], folder: Path, name: str
 ) -> None:
     """Write a URDF whose meshes are Wavefront files beside it."""
     folder.mkdir(parents=True)
@@ -141,7 +141,7 @@ def _rename_world(robot: Element) -> None:
             element.set(key, new)
 
 
-def _visuals(parts: Sequence[Part], link: str, folder: Path, files: Names) -> Iterator[Element]:
+def _visuals(parts: Sequence[Visual], link: str, folder: Path, files: Names) -> Iterator[Element]:
     for number, part in enumerate(parts):
         name = f"{link}_visual_{number}"
         visual = Element("visual", name=name)

@@ -95,5 +95,5 @@ def _licences(source: UrdfSource) -> Iterator[tuple[str, str]]:
         origin = load_manifest().package(source.package).origin
         yield origin.licence, f"{origin.licence} ({origin.licence_note})"
     else:
-        words = "of a file of the user's own; whoever wrote it says under what licence it is"
+        words = "of a file of the user's own; its author decides the licence"
         yield "unknown", words

@@ -18,7 +18,7 @@ from robots.bodies.hulls import shape_corners
 from robots.urdf.model import SIZES, UrdfShape
 
 AS_HULLS = ("mesh", "capsule")  # of which most formats' own shapes are not what they are here
-LEAST_AREA = 1e-12  # m²; of a mesh that is drawn: with less, nobody sees it
+LEAST_AREA = 1e-12  # m²; a mesh with less is too small to be seen, and is not drawn
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,11 +69,11 @@ def search(
         patience: After how long to give up (s). It never changes the layout that is returned.
 
     Raises:
-        LayoutError: If an argument makes no sense; if no robot gets to some target wherever it
-            stands, with how much is missing; if no places were found from which all are reached;
-            or after ``patience``.
+        LayoutError: If an argument is invalid; if some target is out of every robot's reach,
+            wherever it stands (the message says by how much); if no places were found from which
+            all are reached; or after ``patience``.
         UnknownNameError: If a robot, keyframe, target or limb of that name does not exist.
-        AssetError: If a robot's files cannot be found or make no sense.
+        AssetError: If a robot's files cannot be found or are invalid.
         MissingPackageError: If python-fcl or scipy is not installed.
     """
     try:

@@ -140,7 +140,7 @@ def ground_of(
     """Return where bases may stand; see `layouts.search`.
 
     Raises:
-        LayoutError: If an argument makes no sense, or leaves no place.
+        LayoutError: If an argument is invalid, or leaves no place.
     """
     reach = max(robot.reach for robot in robots.values())
     bounds = None if within is None else _rectangle("within", within)

@@ -66,7 +66,7 @@ class Assignment:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Base poses, and what comes of them.
+    """Base poses, and how good they are.
 
     Attributes:
         bases: By robot.
@@ -85,7 +85,7 @@ def requirements_of(
     """Return what is asked for; see `layouts.search`.
 
     Raises:
-        LayoutError: If ``reached_by`` makes no sense.
+        LayoutError: If ``reached_by`` is invalid.
         UnknownNameError: If it names no target, robot or limb.
     """
     if not isinstance(reached_by, Mapping):

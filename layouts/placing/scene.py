@@ -69,7 +69,7 @@ class SearchScene:
             ground: Where they may stand.
 
         Raises:
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
         """
         self.robots, self.keyframe, self.ground = dict(robots), keyframe, ground
         self.pairs = list(combinations(robots, 2))

@@ -72,10 +72,10 @@ def validate(
     """Check a layout; see `layouts.Layout.validate`."""
     if not (isinstance(samples, int) and samples >= 0):
         raise LayoutError(f"samples is {samples!r}; it must be an integer of 0 or more")
-    return _Check(layout, named_targets(targets), samples, table, seed).run(workspaces)
+    return _LayoutCheck(layout, named_targets(targets), samples, table, seed).run(workspaces)
 
 
-class _Check:
+class _LayoutCheck:
     """One check of one layout, with everything loaded that it needs."""
 
     def __init__(
@@ -147,7 +147,7 @@ class _Check:
         for name, error in self._unread.items():
             what = f"{name} cannot be checked: {error}"
             advice = (
-                f"mend the files or the descriptor of {self._layout[name].robot.name}; the others"
+                f"fix the files or the descriptor of {self._layout[name].robot.name}; the others"
                 f" are checked as if {name} were not there"
             )
             yield Finding("files", True, (name,), (), 0.0, "m", what, advice)

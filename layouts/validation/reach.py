@@ -10,7 +10,7 @@ import numpy as np
 
 from layouts.arrangement import Arrangement
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
-from robot_layouts.kinematics.solve import ITERATIONS, Goal, Solutions, scattered, solve
+from robot_layouts.kinematics.solve import ITERATIONS, IkGoal, Solutions, scattered, solve
 from robots import RobotDescriptor
 from robots.bodies.hulls import RobotModel
 from robots.descriptor import IDENTITY
@@ -100,7 +100,7 @@ class Arm:
         tcp = find_tcp(self.own, self.model.kinematics)
         local = np.stack([_local(base, target) for target in targets])
         local = np.repeat(local, starts.shape[1], axis=0)
-        goal = Goal(
+        goal = IkGoal(
             local[:, :3, 3],
             tcp.links,
             local[:, :3, :3] if len(targets[0]) == 7 else None,

@@ -11,7 +11,7 @@ import numpy as np
 from layouts.layout import Layout
 from layouts.validation.collisions import stand, touching
 from layouts.viewer.text import printable
-from layouts.visuals import Part, read_visuals
+from layouts.visuals import Visual, read_visuals
 from robot_layouts.kinematics.rotations import Floats
 from robots import AssetError, LayoutError
 from robots.bodies.hulls import RobotModel, load_model
@@ -26,12 +26,12 @@ class Thing:
         pose: Where it is: position (m, world), then quaternion (wxyz), (7,).
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[Visual, ...]
     pose: Floats
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class ShownMotion:
     """Positions of robots and things over T + 1 moments.
 
     Attributes:
@@ -67,7 +67,7 @@ class LinkContact:
     depth: float
 
 
-class Cell:
+class ShownCell:
     """A layout and what is around it.
 
     Attributes:
@@ -88,7 +88,7 @@ class Cell:
         title: str,
         layout: Layout,
         things: Mapping[str, Thing] | None = None,
-        motion: Motion | None = None,
+        motion: ShownMotion | None = None,
         start: Mapping[str, Floats] | None = None,
         ways: Mapping[str, Sequence[Floats]] | None = None,
         hidden: Sequence[str] = (),
@@ -107,7 +107,7 @@ class Cell:
 
         Raises:
             LayoutError: If the motion is of other robots, or of no moments.
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If trimesh or python-fcl is not installed.
         """
@@ -117,7 +117,7 @@ class Cell:
         self.ways = {name: tuple(lines) for name, lines in (ways or {}).items()}
         self.hidden = tuple(hidden)
         self.models: dict[str, RobotModel] = {n: load_model(p.robot) for n, p in layout.items()}
-        self.visuals: dict[str, Mapping[str, tuple[Part, ...]]] = {}
+        self.visuals: dict[str, Mapping[str, tuple[Visual, ...]]] = {}
         self.notes: list[str] = []
         for name, placement in layout.items():
             try:
@@ -162,7 +162,7 @@ class Cell:
         return sorted(found, key=lambda contact: -contact.depth)
 
 
-def _check_motion(motion: Motion, layout: Layout, things: Mapping[str, Thing]) -> None:
+def _check_motion(motion: ShownMotion, layout: Layout, things: Mapping[str, Thing]) -> None:
     if set(motion.qpos) != set(layout):
         raise LayoutError(
             f"the motion is of the robots {', '.join(motion.qpos)}; the layout has"

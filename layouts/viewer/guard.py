@@ -25,8 +25,8 @@ REFUSAL = (
     "If it reaches you through a tunnel, forward it to the same port number of localhost.\n"
 )
 CROWDED = f"{MOST_CLIENTS} tabs show this page already; close one of them.\n"
-# A browser loads nothing from elsewhere, shows the page in no frame, and passes its address on to
-# nobody. viser's page is one file: a script that unpacks workers, WebAssembly, fonts and pictures.
+# A browser loads nothing from elsewhere, shows the page in no frame, and does not pass its address
+# on. viser's page is one file: a script that unpacks workers, WebAssembly, fonts and pictures.
 POLICY = {
     "default-src": "'none'",
     "script-src": "'unsafe-inline' 'unsafe-eval' blob:",
@@ -42,7 +42,7 @@ POLICY = {
 
 @dataclass(frozen=True)
 class Guard:
-    """Lets in whoever has the token, from the page itself and under a name of this machine's.
+    """Accepts requests with the token, from the page itself, under a name of this machine.
 
     A page of another origin can make a browser ask for this one, or connect to it: it does not have
     the token, and the browser says in ``Origin`` where it comes from. A name on the internet can be

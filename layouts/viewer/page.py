@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts.viewer.cell import Cell, LinkContact, Motion
+from layouts.viewer.cell import LinkContact, ShownCell, ShownMotion
 from layouts.viewer.guard import is_loopback, policy
 from layouts.viewer.scene import OVERLAYS, CellScene
 from layouts.viewer.server import ViewerError, serving
@@ -45,7 +45,7 @@ NOTE_STYLE = (  # above the bar that plays a motion
 
 
 @dataclass(frozen=True, eq=False)
-class _Driven:
+class _SliderJoints:
     """Joints that one slider moves.
 
     Attributes:
@@ -65,7 +65,7 @@ class _Driven:
 class CellPage:
     """A cell with its panel, on a viser server."""
 
-    def __init__(self, server: Any, cell: Cell) -> None:
+    def __init__(self, server: Any, cell: ShownCell) -> None:
         """Draw the cell and its panel.
 
         Args:
@@ -80,7 +80,7 @@ class CellPage:
         server.scene.set_up_direction("+z")
         self.scene = CellScene(server.scene, cell)
         self.scene.aim(server.initial_camera)
-        self._sliders: dict[str, list[tuple[Any, _Driven]]] = {}
+        self._sliders: dict[str, list[tuple[Any, _SliderJoints]]] = {}
         self._timeline: Any = None
         self._playing: Any = None
         self._moment = 0.0  # steps since the start, with fractions while it plays
@@ -143,7 +143,7 @@ class CellPage:
         for name in self._cell.layout:
             self._build_robot(gui, name)
 
-    def _build_timeline(self, gui: Any, motion: Motion) -> None:
+    def _build_timeline(self, gui: Any, motion: ShownMotion) -> None:
         with gui.add_folder(printable(motion.name)):
             self._timeline = gui.add_slider("Step", 0, max(len(motion) - 1, 1), 1, 0)
             self._clock = Text(gui, "")
@@ -161,13 +161,13 @@ class CellPage:
     def _build_robot(self, gui: Any, name: str) -> None:
         robot = self._cell.layout[name].robot
         with gui.add_folder(f"{name} ({robot.name})", expand_by_default=len(self._cell.layout) < 3):
-            sliders: list[tuple[Any, _Driven]] = []
+            sliders: list[tuple[Any, _SliderJoints]] = []
             for group in robot.action_split.groups.values():
                 joints = [robot.joints.index(joint) for joint in group.joints]
                 followers = np.array(group.followers)
                 together = [slice(None)] if group.mimic else [[i] for i in range(len(joints))]
                 for some in together:
-                    driven = _Driven(np.array(joints)[some], followers[some])
+                    driven = _SliderJoints(np.array(joints)[some], followers[some])
                     sliders.append((self._add_slider(gui, name, driven.joints[0], group), driven))
             start = gui.add_button("Back to the start")
         self._sliders[name] = sliders
@@ -183,7 +183,7 @@ class CellPage:
         step = 0.0001 if group.unit == "m" else 0.001
         return gui.add_slider(f"{printable(label)} ({group.unit})", low, high, step, value)
 
-    def _slide(self, event: Any, name: str, driven: _Driven) -> None:
+    def _slide(self, event: Any, name: str, driven: _SliderJoints) -> None:
         if event.client_id is None:  # set by this page, not by a person
             return
         with self._lock:
@@ -201,7 +201,7 @@ class CellPage:
             self._stale.set()
 
 
-def serve(cell: Cell, host: str, port: int, announce: Callable[[str], None]) -> NoReturn:
+def serve(cell: ShownCell, host: str, port: int, announce: Callable[[str], None]) -> NoReturn:
     """Serve a page until something, such as Ctrl-C, raises.
 
     Args:
@@ -255,7 +255,7 @@ def contacts_text(contacts: list[LinkContact]) -> str:
     return "\n".join([*lines, *([f"- and {rest} more"] if rest else [])])
 
 
-def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
+def save_html(cell: ShownCell, path: str | os.PathLike[str]) -> Path:
     """Save a page as one file that needs no server and fetches nothing.
 
     It has no sliders for joints, and says so: robots stand as they start, or play the motion. What
@@ -283,7 +283,7 @@ def save_html(cell: Cell, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def _recorded(server: Any, cell: Cell) -> Any:
+def _recorded(server: Any, cell: ShownCell) -> Any:
     """Draw a cell, and return viser's recording of it."""
     server.scene.set_up_direction("+z")
     scene = CellScene(server.scene, cell)
@@ -302,7 +302,7 @@ def _recorded(server: Any, cell: Cell) -> Any:
     return recording
 
 
-def _note(cell: Cell) -> str:
+def _note(cell: ShownCell) -> str:
     """Return what the panel of a served page says, as far as it holds without sliders."""
     start = "Where the robots start:\n" + contacts_text(cell.contacts(cell.start))
     paragraphs = "".join(f"<p>{as_html(text)}</p>" for text in (*cell.notes, start, NO_SLIDERS))

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from layouts.frames import table_outlines
-from layouts.viewer.cell import Cell, LinkContact, Thing
+from layouts.viewer.cell import LinkContact, ShownCell, Thing
 from layouts.viewer.text import node
-from layouts.visuals import Part, coarse, simplified
+from layouts.visuals import Visual, coarse, simplified
 from robot_layouts.core.figures import COLOURS
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robots.urdf.tree import link_index
@@ -40,7 +40,7 @@ class CellScene:
     ``/(ways)/ROBOT/…``: no robot's name has brackets.
     """
 
-    def __init__(self, api: Any, cell: Cell, drawn: Collection[str] = tuple(OVERLAYS)) -> None:
+    def __init__(self, api: Any, cell: ShownCell, drawn: Collection[str] = tuple(OVERLAYS)) -> None:
         """Draw the cell as it starts.
 
         Args:
@@ -257,7 +257,7 @@ class CellScene:
             )
 
 
-def _add_parts(api: Any, path: str, parts: Sequence[Part]) -> Any:
+def _add_parts(api: Any, path: str, parts: Sequence[Visual]) -> Any:
     import trimesh
 
     scene = trimesh.Scene([simplified(part).mesh for part in parts])
@@ -265,7 +265,7 @@ def _add_parts(api: Any, path: str, parts: Sequence[Part]) -> Any:
     return api.add_glb(path, data)
 
 
-def _add_plain(api: Any, path: str, parts: Sequence[Part]) -> Any:
+def _add_plain(api: Any, path: str, parts: Sequence[Visual]) -> Any:
     """Add parts coarsely, each in one colour that needs little computing."""
     frame = api.add_frame(path, show_axes=False)
     for number, part in enumerate(map(coarse, parts)):

@@ -19,7 +19,7 @@ from robots import MissingPackageError, RobotLayoutsError
 LAST_PORT = 65535
 PROBE_SECONDS = 10.0
 REST = 0.002  # s between two messages of a browser, which sends 120 in a second of dragging
-# What strangers send makes no lines on the terminal; who wants them adds a handler.
+# Requests without the token are not logged on the terminal; to see them, add a handler.
 LOG = logging.getLogger(__name__)
 LOG.addHandler(logging.NullHandler())
 _STARTING = threading.Lock()
@@ -43,7 +43,7 @@ class PageServer(NamedTuple):
 
 @contextmanager
 def serving(host: str, port: int, title: str) -> Generator[PageServer, None, None]:
-    """Start a viser server that lets in only whoever has its token, and stop it at the end.
+    """Start a viser server that accepts only requests with its token, and stop it at the end.
 
     Args:
         host: Address to listen at; ``0.0.0.0`` is every one of this machine's.
@@ -53,7 +53,7 @@ def serving(host: str, port: int, title: str) -> Generator[PageServer, None, Non
     Raises:
         MissingPackageError: If viser is not installed.
         ViewerError: If the port is in use, the address is none of this machine's, or this version
-            of viser would let in anybody.
+            of viser would accept any client.
     """
     viser = import_viser()
     port = _free_port(host, port)
@@ -124,8 +124,8 @@ def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
 def _sifted(handler: Callable[..., Any], started: list[Any]) -> Callable[..., Any]:
     """Return a handler of connections that receives only messages which `fits` lets through.
 
-    And these no faster than one in `REST` seconds, so that whoever floods the page does not keep
-    this process from all else.
+    It receives at most one in `REST` seconds, so that a flood of messages does not keep this
+    process from everything else.
     """
 
     async def handle(connection: Any) -> None:
@@ -145,7 +145,7 @@ def _sifted(handler: Callable[..., Any], started: list[Any]) -> Callable[..., An
 
 
 def _check_guarded(server: Any, host: str, port: int) -> None:
-    """Ask the server for the page and for a WebSocket as a stranger would.
+    """Ask the server for the page and for a WebSocket, without the token.
 
     Raises:
         ViewerError: If it does not refuse both.
@@ -161,7 +161,7 @@ def _check_guarded(server: Any, host: str, port: int) -> None:
     answers = {_status(host, port, headers) for headers in ({}, upgrade)}
     if answers != {403} or not hasattr(server.gui, "_gui_input_handle_from_uuid"):
         raise ViewerError(
-            f"viser {viser.__version__} would let in anybody who asks, so no page is served:"
+            f"viser {viser.__version__} would accept any client, so no page is served:"
             " pip install 'viser>=1.1.1,<1.2'"
         )
 
@@ -183,7 +183,7 @@ def _free_port(host: str, port: int) -> int:
     if not host:
         raise ViewerError("--host is empty; 127.0.0.1 is this machine alone, 0.0.0.0 the network")
     if not 0 <= port <= LAST_PORT:
-        raise ViewerError(f"port {port} is none; ports are 0 … {LAST_PORT}")
+        raise ViewerError(f"port {port} does not exist; ports are 0 … {LAST_PORT}")
     try:
         family, kind, protocol, _, place = socket.getaddrinfo(
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE

@@ -36,8 +36,7 @@ def written_whole(
     Args:
         path: The target.
         error: Raised if the disk refuses; None leaves the operating system's errors as they are.
-        partial: The path to write to, on the same file system; left out, one that nobody else
-            uses.
+        partial: The path to write to, on the same file system; left out, a path of its own.
         parents: Whether to make the folder that it is in.
         sync: Whether to wait until a file is on the disk before it takes the target's place.
         over: Whether a folder may also take the place of one that holds something.

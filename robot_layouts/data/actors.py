@@ -123,7 +123,7 @@ def episode_source(
     Args:
         actors: Who could act, the policy first.
         turns: The number of who acted at each step, (T,).
-        corrector: Who said at each step what would have been right, if anybody did.
+        corrector: Who corrected each step, if anyone did.
     """
     numbers, places = np.unique(turns, return_inverse=True)
     acted = [actors[number].to_json() for number in numbers]

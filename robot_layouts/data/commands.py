@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from layouts.commands import Page, Server
 from robot_layouts.core.cli import Folder, Seed
@@ -19,16 +19,12 @@ from robot_layouts.data.playing.command_options import (
     stop_signals,
 )
 from robots import TaskError
-from tasks.cell_options import Cell
+from tasks.cell_options import CellOptions
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from layouts.viewer import Cell as ShownCell
-    from layouts.viewer import Motion
     from robot_layouts.data.playing.replay import Replayed
-    from robot_layouts.data.reading.recording import Recording, Trajectory
-    from tasks import TaskEnv
 
 TELEOP_FOLDER = Path("runs/teleop")
 
@@ -39,7 +35,7 @@ def teleop(
     seed: Seed = 0,
     out: Folder | None = None,
     policy: Policy | None = None,
-    cell: Cell,
+    cell: CellOptions,
     control_mode: ControlMode | None = None,
     server: Server,
 ) -> None:
@@ -53,7 +49,7 @@ def teleop(
         task: Task id; MODULE:ID for one of your own.
         seed: Seed of the first episode.
         out: Folder of trajectory.h5 and .json (runs/teleop/TASK).
-        policy: Policy that acts until somebody takes an arm, as for `robot-layouts evaluate`.
+        policy: Policy that acts until the user takes over an arm, as for `robot-layouts evaluate`.
         cell: The task's robots, and what varies.
         control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
         server: Where the page is served.
@@ -104,6 +100,8 @@ def view(recording: RecordingOption, *, episode: int = 0, page: Page) -> None:
     Raises:
         RobotLayoutsError: If the recording cannot be shown.
     """
+    from robot_layouts.data.view import episode_cell
+
     with recording.open() as file:
         cell = recording.cell.making()
         page.show(lambda: episode_cell(file, episode, **cell))
@@ -115,7 +113,7 @@ def view_task(
     seed: int = 0,
     demo: RecordingPath | None = None,
     episode: int = 0,
-    cell: Cell,
+    cell: CellOptions,
     page: Page,
 ) -> None:
     """Look at a task, or at a demonstration of it, in a browser.
@@ -143,54 +141,6 @@ def view_task(
         )
     else:
         view(RecordingOption(demo, task=task, cell=cell), episode=episode, page=page)
-
-
-def episode_cell(file: Recording, number: int, **cell: Any) -> ShownCell:
-    """Return what a page shows of an episode.
-
-    Args:
-        file: The recording.
-        number: Its place in the file.
-        **cell: Which robots stood where, where the file cannot say it; see
-            `robot_layouts.data.reading.recorded_task.task_for`.
-
-    Raises:
-        TrajectoryError: If there is no such episode, or it cannot be shown.
-    """
-    from robot_layouts.data.reading.json_files import TrajectoryError
-    from robot_layouts.data.reading.recorded_task import task_for
-    from tasks.view import task_cell
-
-    if not len(file):
-        raise TrajectoryError(f"{file.path} holds no episodes")
-    if not 0 <= number < len(file):
-        raise TrajectoryError(
-            f"{file.path} has no episode {number}; it has {len(file)}, from 0 to {len(file) - 1}"
-        )
-    task, trajectory = task_for(file, **cell), file[number]
-    try:
-        motion = _motion(task, trajectory)
-        title = f"{task.task_id}, episode {trajectory.episode_id} of {file.path.name}"
-        return task_cell(task, title, motion)
-    finally:
-        task.close()
-
-
-def _motion(task: TaskEnv, trajectory: Trajectory) -> Motion:
-    """Reset the task as the episode began, and return what happens in it."""
-    from robot_layouts.data.reading.json_files import TrajectoryError
-    from tasks.episode import REBUILT, play
-    from tasks.view import recorded_motion
-
-    states = trajectory.states
-    if states is None:
-        if trajectory.seed is None:
-            raise TrajectoryError(
-                f"traj_{trajectory.episode_id} holds neither states nor the seed of its reset"
-            )
-        states = play(task, trajectory.seed, trajectory.actions).states
-    task.reset(trajectory.seed or 0, options=REBUILT)
-    return recorded_motion(task, states)
 
 
 def replay(

@@ -24,7 +24,7 @@ from robot_layouts.experts import find_expert
 from robot_layouts.experts.rehearsal import rehearsed
 from robots import AssetError, MissingPackageError, RecordingError, TaskError
 from tasks import TaskEnv
-from tasks.cell_options import Cell
+from tasks.cell_options import CellOptions
 from tasks.episode import PlayedEpisode, Score, play
 from tasks.registry import make_scenario
 
@@ -64,7 +64,7 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
     Raises:
         UnknownNameError: If there is no such task.
         TaskError: If the task has no expert.
-        AssetError: If the robot files that physics needs cannot be had.
+        AssetError: If the robot files that physics needs cannot be found.
         RecordingError: If ``out`` cannot be written.
     """
     torch.set_num_threads(1)  # the tensors are small: threads would only wait for each other
@@ -122,7 +122,7 @@ def _pictures_problem(layout: Layout) -> str | None:
         for placement in layout.values():
             placement.robot.urdf.locate(pictures=True)
     except AssetError as error:
-        return f"the robots' visual meshes cannot be had: {str(error).splitlines()[0]}"
+        return f"the robots' visual meshes are missing: {str(error).splitlines()[0]}"
     return None
 
 
@@ -194,7 +194,7 @@ def demo(
     seeds: Count = 10,
     out: Folder = Path("runs/demo"),
     no_video: bool = False,
-    cell: Cell,
+    cell: CellOptions,
 ) -> int:
     """Let an expert play a task, and keep a recording, a picture and a video.
 

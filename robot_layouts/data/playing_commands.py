@@ -23,7 +23,7 @@ from robot_layouts.data.playing.command_options import (
 )
 from robot_layouts.data.reading.json_files import FILE_SIZE
 from robots import RecordingError, RobotDescriptor
-from tasks.cell_options import Cell, PlacedRobot, chosen_robots
+from tasks.cell_options import CellOptions, PlacedRobot, chosen_robots
 
 if TYPE_CHECKING:
     from robot_layouts.data.dataset.certificate import RecordingCertificate
@@ -56,7 +56,7 @@ def record(
     players: Players,
     seed: Seed = 0,
     options: RecordOptions,
-    cell: Cell,
+    cell: CellOptions,
 ) -> int:
     """Let an expert or a policy play episodes in worker processes, and record them.
 
@@ -75,7 +75,8 @@ def record(
         cell: The task's robots, and what varies.
 
     Raises:
-        RobotLayoutsError: If it makes no sense, or cannot go on; finished episodes are kept.
+        RobotLayoutsError: If an option is invalid, or recording cannot go on; finished episodes are
+            kept.
     """
     from robot_layouts.core.processes.start import WorkerError
     from robot_layouts.core.progress import Progress
@@ -125,7 +126,7 @@ def evaluate(
     seed: Seed = 0,
     receipt: Annotated[Path, Word("JSON")] | None = None,
     acting: Acting,
-    cell: Cell,
+    cell: CellOptions,
 ) -> None:
     """Let a policy or an expert play episodes, and print how well it does.
 
@@ -142,7 +143,7 @@ def evaluate(
         cell: The task's robots, and what varies.
 
     Raises:
-        RobotLayoutsError: If it makes no sense, or the policy fails.
+        RobotLayoutsError: If an option is invalid, or the policy fails.
     """
     from robot_layouts.core.progress import Progress
     from robot_layouts.data import evaluation

@@ -9,6 +9,7 @@ import numpy as np
 from robot_layouts.kinematics.rotations import Floats
 from robots import JointGroup, RobotDescriptor
 from robots.action_split import is_gripper
+from robots.gripper_motion import gripper_motion
 
 GAIN = 2.0  # of the joint error; PhysX's drive follows about 0.4 of a target in one step
 
@@ -21,27 +22,56 @@ class ArmDriver:
         self._place = {joint: i for i, joint in enumerate(descriptor.joints)}
         self._arm_joints = descriptor.arm_joints
         self._groups = dict(descriptor.action_split.groups)
+        self._descriptor = descriptor
 
     def arm(self, qpos: Floats) -> Floats:
         """Pick the arm's joints out of all joints in the descriptor's order, (dof,)."""
         return qpos[[self._place[joint] for joint in self._arm_joints]]
 
-    def action(self, goal: Floats, gripper: float, qpos: Floats) -> Floats:
+    def action(
+        self,
+        goal: Floats,
+        gripper: float,
+        qpos: Floats,
+        share: float | None = None,
+        squeeze: float | None = None,
+    ) -> Floats:
         """Return the action numbers, arm joints slowed alike so that they arrive together.
 
         Args:
             goal: Arm joints to reach, in the descriptor's order (rad).
             gripper: Action number of the gripper, if there is one.
             qpos: All joints now, in the descriptor's order, (dof,) (rad, m).
+            share: Instead of ``gripper``, how far it is to be open, from 0 to 1.
+            squeeze: Instead of both, the force with which its fingers are to close (N).
         """
         goals = dict(zip(self._arm_joints, goal, strict=True))
+        if squeeze is not None:
+            share = self._squeezing(squeeze, qpos)
+        if share is not None:
+            motion = gripper_motion(self._descriptor)
+            goals.update(zip(motion.joints, motion.positions(share), strict=True))
         parts: list[Floats] = []
         for name, group in self._groups.items():
-            if is_gripper(name) or group.held:
+            if group.held or (is_gripper(name) and share is None):
                 parts.append(np.full(group.size, gripper))
+            elif group.mimic:
+                parts.append(self._opening(group, goals))
             else:
                 parts.append(self._towards(group, goals, qpos))
         return np.concatenate(parts)
+
+    def _squeezing(self, force: float, qpos: Floats) -> float:
+        """Return the share towards which the gripper presses with a force, by its drives."""
+        motion = gripper_motion(self._descriptor)
+        now = motion.share_at(qpos[[self._place[joint] for joint in motion.joints]])
+        return now - motion.pressing(force, now)
+
+    def _opening(self, group: JointGroup, goals: Mapping[str, float]) -> Floats:
+        """Return the one number of a group that brings its first joint to its goal."""
+        (low, high), (times, plus) = group.ranges[0], group.followers[0]
+        value = (goals[group.joints[0]] - plus) / times
+        return np.clip([(2 * value - high - low) / (high - low)], -1.0, 1.0)
 
     def _towards(self, group: JointGroup, goals: Mapping[str, float], qpos: Floats) -> Floats:
         target = np.array([goals[joint] for joint in group.joints])

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.experts.motion_drives import NEAR, Aim, MotionDrive, drive_within_bounds
-from robot_layouts.experts.tips import link_tree
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.motion import Motion
 from robot_layouts.simulation.backend import Overlap
 from robot_layouts.simulation.checks.overlaps import between_robots, deepest
 from robots import TaskError
 from robots.action_split import is_gripper
+from robots.gripper_motion import link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 from tasks.driving import driven_groups, joint_slices
@@ -178,8 +178,9 @@ def follow(
         What was done, and how near to the motion the robots stayed.
 
     Raises:
-        TaskError: If the motion is none for this task, see `Follower`, or for `WAIT` control steps
-            the robots do not get on: something is in the way, or the control mode cannot do it.
+        TaskError: If the motion does not fit this task, see `Follower`, or the robots make no
+            progress for `WAIT` control steps: something is in the way, or the control mode cannot
+            do it.
         UnknownNameError: If there is no such arm.
     """
     follower = Follower(task, motion, grippers)
@@ -246,7 +247,7 @@ def _stuck(layout: Layout, follower: Follower, came: Floats, contacts: Iterable[
     )
     joint = layout[name].robot.joints[int(missing.argmax()) - places.start]
     return (
-        f"the robots do not get on at {follower.time:.2f} s of {follower.motion.duration:.2f} s:"
+        f"the robots make no progress at {follower.time:.2f} s of {follower.motion.duration:.2f} s:"
         f" {name}'s {joint} is {missing.max():.3g} (rad or m) from where it should be"
         + "".join(f"; {contact}" for contact in deepest(contacts, than=0.0)[:1])
     )

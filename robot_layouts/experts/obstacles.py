@@ -11,7 +11,7 @@ from robot_layouts.experts.script import Pose, Scene
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
 from robot_layouts.motion.model.obstacles import Obstacle, box, cylinder, mesh, sphere
 from robot_layouts.simulation.scene.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
-from robot_layouts.simulation.world import Body
+from robot_layouts.simulation.world import WorldBody
 
 HALF_SPACE = 20.0  # m; edges of the box that stands for what is below a plane
 
@@ -32,13 +32,13 @@ def obstacles(scene: Scene) -> dict[str, Obstacle]:
 
 
 @lru_cache(maxsize=256)
-def _obstacle(body: Body) -> Obstacle | None:
+def _obstacle(body: WorldBody) -> Obstacle | None:
     """Return a body anywhere, so that what is prepared for its shapes is so once; None of none."""
     shapes = tuple(_shapes(body))
     return Obstacle(f"the {body.name}", shapes) if shapes else None
 
 
-def _shapes(body: Body) -> Iterator[Floats]:
+def _shapes(body: WorldBody) -> Iterator[Floats]:
     for shape in body.shapes:
         if shape.collides:
             pose: Pose = np.array(shape.position), np.array(shape.quaternion)

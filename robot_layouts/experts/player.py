@@ -20,6 +20,7 @@ from tasks import TaskEnv
 PATIENCE = 40  # control steps without progress after which an arm counts as blocked
 PROGRESS = 1e-3  # rad
 VIA = 0.06  # rad: so near an arm comes to each place of a way round before it goes on
+SETTLING, LEADING = 0.1, 0.2  # rad from its goal at which an arm settles; share of it per step
 AGAIN, WAITING = 4, 100  # control steps after which an arm that waits looks again, and gives up
 
 
@@ -55,6 +56,7 @@ class Player:
         self._driver = ArmDriver(task.layout.arm(robot).robot)
         if any(waypoint.to is not None for waypoint in waypoints):
             self._kinematics = pose_solver(task, robot)
+        if any((waypoint.to or waypoint.joints) is not None for waypoint in waypoints):
             self._alone, self._owner = alone, task.layout.owner(robot)
             joints = task.layout[self._owner].robot.joints
             self._own = [joints.index(joint) for joint in task.layout.arm(robot).robot.arm_joints]
@@ -62,7 +64,10 @@ class Player:
             self._reach = task.simulation.backend.point_reach(robot)
             self._base = scene.base(robot)
         self._goal = self._driver.arm(scene.qpos(robot))
-        self._gripper = OPEN
+        self._gripper: float = OPEN
+        self._share: float | None = None
+        self._squeeze: float | None = None
+        self._leading = np.zeros_like(self._goal)
         self._current: Waypoint | None = None
         self._begun = self._elapsed = 0  # waypoints begun; steps taken in the current one
         self._later: list[Floats] = []  # where it goes after its goal
@@ -108,7 +113,21 @@ class Player:
         if self._may_begin(done):
             self._begin(self._waypoints[self._begun], scene)
         self._elapsed += 1
-        return self._driver.action(self._goal, self._gripper, scene.qpos(self._robot))
+        qpos = scene.qpos(self._robot)
+        goal = self._goal + self._lead(scene)
+        return self._driver.action(goal, self._gripper, qpos, self._share, self._squeeze)
+
+    def _lead(self, scene: Scene) -> Floats | float:
+        """Return how far beyond its goal an arm is driven, so that its weight does not hold it off.
+
+        It grows while the arm is near a posture that it was asked for as such.
+        """
+        if self._current is None or self._current.joints is None:
+            return 0.0
+        away = self._goal - self._arm(scene)
+        if np.abs(away).max() < SETTLING:
+            self._leading = np.clip(self._leading + LEADING * away, -SETTLING, SETTLING)
+        return self._leading
 
     def _arm(self, scene: Scene) -> Floats:
         return self._driver.arm(scene.qpos(self._robot))
@@ -124,7 +143,7 @@ class Player:
     def _is_done(self, waypoint: Waypoint, scene: Scene) -> bool:
         if self._elapsed < waypoint.steps:
             return False
-        if (waypoint.to, waypoint.turn, waypoint.at) != (None, None, None):
+        if any((waypoint.to, waypoint.turn, waypoint.at, waypoint.joints)):
             away = np.abs(self._arm(scene) - self._goal).max()
             if self._later or away > waypoint.near:
                 self._check_progress(float(away))
@@ -156,9 +175,13 @@ class Player:
                 return
             self._goal, *self._later = way
         elif goals:
-            free = (goal for goal in goals if waypoint.to is None or self._is_free(goal, scene))
+            sought = waypoint.to is not None or waypoint.joints is not None
+            free = (goal for goal in goals if not sought or self._is_free(goal, scene))
             self._goal = next(free, goals[0])
-        self._current, self._gripper = waypoint, waypoint.gripper
+        self._current = waypoint
+        self._gripper, self._share, self._squeeze = (
+            waypoint.gripper, waypoint.share, waypoint.squeeze
+        )  # fmt: skip
         self._begun, self._elapsed = self._begun + 1, 0
         self._nearest_yet, self._waited = np.inf, 0
 
@@ -176,6 +199,8 @@ class Player:
             goals = [arm + waypoint.turn(arm)]
         elif waypoint.at is not None:
             goals = self._reaching(waypoint.at(scene), scene)
+        elif waypoint.joints is not None:
+            goals = list(waypoint.joints(scene))
         else:
             return []
         if not goals:

@@ -39,6 +39,7 @@ CATALOGUE = {
     "RollBall-v1": "robot_layouts.experts.maniskill.roll_ball:roll",
     "StackCube-v1": "robot_layouts.experts.maniskill.stack_cube:stack_cube",
     "StackPyramid-v1": "robot_layouts.experts.maniskill.stack_pyramid:stack_pyramid",
+    "TwoRobotHandOver-v1": "robot_layouts.experts.originals.two_robot_hand_over:hand_over",
     "TwoRobotLiftBar-v1": "robot_layouts.experts.originals.two_robot_lift_bar:lift_for_two",
     "TwoRobotPickCube-v1": "robot_layouts.experts.maniskill.two_robot_pick_cube:hand_over",
     "TwoRobotPushPick-v1": "robot_layouts.experts.originals.two_robot_push_pick:push_and_pick",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -192,7 +192,7 @@ def _players(task: TaskEnv, script: Script, scene: Scene, alone: RobotsAlone) ->
     ]
 
 
-def first_success(task: TaskEnv, seed: int, scripts: Callable[[Scene], Sequence[Script]]) -> Plan:
+def first_success(task: TaskEnv, seed: int, scripts: Callable[[Scene], Iterable[Script]]) -> Plan:
     """Try scripts one after the other and return the actions of the first that succeeds.
 
     If none does, those in which arms touched, or something blocked one, are tried once more, with

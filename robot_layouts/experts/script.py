@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.experts.tips import gripper_turn
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation import State
-from robot_layouts.simulation.world import Body
+from robot_layouts.simulation.world import WorldBody
+from robots.gripper_motion import gripper_turn
 from tasks import TaskEnv
 
 OPEN, CLOSED = 1.0, -1.0
@@ -34,7 +34,7 @@ class Scene:
         self._layout = task.standing()
         world = task.simulation.worlds[0]
         self.design: Any = world.design
-        self.bodies: tuple[Body, ...] = tuple(world.bodies.values())
+        self.bodies: tuple[WorldBody, ...] = tuple(world.bodies.values())
 
     def body(self, name: str) -> Pose:
         """Return the pose of a body."""
@@ -86,6 +86,11 @@ class Waypoint:
         most: Number of control steps after which, if it is not done, the script has failed.
         at: Instead of ``to``, where the TCP should be, (3,) (m, world), turned in any way: for arms
             of too few joints to choose that too.
+        joints: Instead of ``to``, postures of the arm, each (arm joints,) (rad), worked out from
+            the scene when the waypoint begins; the one with the shortest way there is taken.
+        share: Instead of ``gripper``, how far the gripper is open meanwhile, from 0 to 1; see
+            `robots.gripper_motion.GripperMotion`.
+        squeeze: Instead of both, the force with which its fingers close meanwhile (N).
     """
 
     name: str
@@ -98,6 +103,9 @@ class Waypoint:
     turn: Callable[[Floats], Floats] | None = None
     most: int | None = None
     at: Callable[[Scene], Floats] | None = None
+    joints: Callable[[Scene], Sequence[Floats]] | None = None
+    share: float | None = None
+    squeeze: float | None = None
 
 
 Script = Mapping[str, Sequence[Waypoint]]

@@ -82,7 +82,7 @@ class Ways:
             NoWayError: If there is no free way now.
         """
         query = self._query(self._layout.arm_name(arm), scene, ahead)
-        places: list[_Place] = []
+        places: list[_GoalPosture] = []
         for goal in goals[:CANDIDATES]:
             if (place := query.place(goal)) is None:
                 continue
@@ -134,7 +134,7 @@ class Ways:
         return np.array([first + own.index(joint) for joint in joints], np.intp)
 
 
-class _Place(NamedTuple):
+class _GoalPosture(NamedTuple):
     """A posture at the goal, (arm joints,) (rad), and the space in which ways there lie."""
 
     goal: Floats
@@ -180,7 +180,7 @@ class _Query:
         self._everywhere = np.stack([everywhere[0], *later])
         self.trouble = ""
 
-    def place(self, goal: Floats) -> _Place | None:
+    def place(self, goal: Floats) -> _GoalPosture | None:
         """Return a posture at the goal; None if something is in the way there, see `trouble`."""
         nearer, states = dict(self._nearer), self._everywhere.copy()
         states[:, self._columns] = goal
@@ -193,9 +193,9 @@ class _Query:
             return None
         short = bool(np.abs(goal - self.start).max() < SHORT)
         only_straight = (self._at_body or at_body) and short
-        return _Place(goal, self._space(nearer, goal), only_straight)
+        return _GoalPosture(goal, self._space(nearer, goal), only_straight)
 
-    def way_round(self, place: _Place) -> Floats | None:
+    def way_round(self, place: _GoalPosture) -> Floats | None:
         """Return the points of a way that is not straight, without its start; None if none."""
         if place.only_straight:
             return None

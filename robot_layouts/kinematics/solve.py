@@ -36,7 +36,7 @@ _LONGEST_DIFFERENCE_STEP = 0.3  # of a joint, per iteration (rad)
 
 
 @dataclass(frozen=True, eq=False)
-class Goal:
+class IkGoal:
     """Where a point of a tree is to be, and how a link is to be turned, in the root's frame.
 
     Attributes:
@@ -86,7 +86,12 @@ class Solutions:
 
 
 def solve(
-    tree: Tree, goal: Goal, starts: Floats, free: Sequence[int], iterations: int = ITERATIONS
+    tree: Tree,
+    goal: IkGoal,
+    starts: Floats,
+    free: Sequence[int],
+    iterations: int = ITERATIONS,
+    turn_worth: float = 1.0,
 ) -> Solutions:
     """Bring a tree to a goal by damped least squares, from every start at once.
 
@@ -96,18 +101,20 @@ def solve(
         starts: Coordinates, (n, coordinates) (rad, m).
         free: Indices of the coordinates that may move, within their limits.
         iterations: How many steps it takes at most.
+        turn_worth: Distance that counts as much as a turn by 1 rad (m): less where joints are too
+            few for both, so that the place comes first.
     """
     needed = tree.towards([*goal.links, goal.turned])
     links = [needed.link(tree.links[link]) for link in goal.links]
     turned = needed.link(tree.links[goal.turned])
     goal = replace(goal, links=links, turned=turned)
-    qpos = _descend(needed, goal, starts.copy(), free, iterations)
+    qpos = _solved(needed, goal, starts.copy(), free, iterations, turn_worth)
     missing, turn_missing = shortfalls(needed, goal, qpos)
     solved = (missing < NEAR_ENOUGH[0]) & (turn_missing < NEAR_ENOUGH[1])
     return Solutions(qpos, missing, turn_missing, solved)
 
 
-def shortfalls(tree: Tree, goal: Goal, qpos: Floats) -> tuple[Floats, Floats]:
+def shortfalls(tree: Tree, goal: IkGoal, qpos: Floats) -> tuple[Floats, Floats]:
     """Return how far the point stays from its place, (n,) (m), and how far from its turn (rad).
 
     Args:
@@ -121,7 +128,7 @@ def shortfalls(tree: Tree, goal: Goal, qpos: Floats) -> tuple[Floats, Floats]:
 
 def approach(
     tree: Tree,
-    goal: Goal,
+    goal: IkGoal,
     qpos: Floats,
     free: Sequence[int],
     longest: Floats | float,
@@ -166,7 +173,7 @@ def approach(
 
 
 def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> tuple[Floats, Floats]:
-    """Return the way that mends the place; and one that mends what else it can, a bit homeward."""
+    """Return the step that corrects the position, and one that corrects the rest, bent homeward."""
     free = np.eye(slopes.shape[1])
     way = _back(slopes[:3], _PLACE_DAMPING) @ errors[:3]
     spare = free - _back(slopes[:3], _NO_DAMPING) @ slopes[:3]
@@ -177,7 +184,7 @@ def _by_priority(errors: Floats, slopes: Floats, homeward: Floats) -> tuple[Floa
 
 
 def _back(slopes: Floats, damping: float) -> Floats:
-    """Return what turns errors into the way that mends them by damped least squares."""
+    """Return the damped least-squares matrix that turns errors into the step that corrects them."""
     return slopes.T @ np.linalg.inv(slopes @ slopes.T + damping**2 * np.eye(len(slopes)))
 
 
@@ -193,12 +200,21 @@ def _share(way: Floats, at: Floats, low: Floats, high: Floats) -> float:
     return float(np.clip(shares.min(initial=1.0), 0.0, 1.0))
 
 
-def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int], iterations: int) -> Floats:
+def _solved(
+    tree: Tree,
+    goal: IkGoal,
+    qpos: Floats,
+    free: Sequence[int],
+    iterations: int,
+    turn_worth: float,
+) -> Floats:
     limits = tree.limits[free]
     rows = 3 if goal.rotation is None else 6
+    worth = np.array((1.0, 1.0, 1.0, turn_worth, turn_worth, turn_worth))[:rows]
     damping = DAMPING**2 * np.eye(rows)
     for _ in range(iterations):
         errors, slopes = _errors(tree, goal, qpos, free)
+        errors, slopes = errors * worth, slopes * worth[:, None]
         if (np.abs(errors).max(axis=1) < NEAR_ENOUGH[0] / 10).all():
             break
         # A joint at a limit that it is drawn beyond leaves the way to the others.
@@ -214,7 +230,7 @@ def _descend(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int], iteratio
     return qpos
 
 
-def _errors(tree: Tree, goal: Goal, qpos: Floats, free: Sequence[int]) -> tuple[Floats, Floats]:
+def _errors(tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int]) -> tuple[Floats, Floats]:
     """Return what is missing to the goal, (n, 3 or 6), and its slopes by the free coordinates."""
     poses = tree.forward(qpos)
     place = poses[:, goal.links][..., :3, 3].mean(axis=1)

@@ -52,7 +52,7 @@ def plan(
         picture: Save a picture (.png, .pdf, .svg; moving: .webp, .gif).
 
     Raises:
-        RobotLayoutsError: If an option makes no sense, or no motion is found.
+        RobotLayoutsError: If an option is invalid, or no motion is found.
     """
     motion = planning.plan(
         layout.layout(),

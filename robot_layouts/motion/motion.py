@@ -153,9 +153,9 @@ class Motion:
             The certificate: ``ok``, what was found, and a readable ``str``.
 
         Raises:
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             MissingPackageError: If python-fcl is not installed.
-            MotionError: If ``step`` or ``turn`` makes no sense, or takes too many moments.
+            MotionError: If ``step`` or ``turn`` is invalid, or takes too many moments.
         """
         from robot_layouts.motion.certificate import certify
 
@@ -226,7 +226,7 @@ class Motion:
             The path of the picture.
 
         Raises:
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             MissingPackageError: If matplotlib is not installed.
             MotionError: If the ending names no supported format.
             UnwritableFileError: If it cannot be written (also an ``OSError``).
@@ -276,10 +276,10 @@ class Motion:
             The files.
 
         Raises:
-            MotionError: If the frequency makes no sense.
+            MotionError: If the frequency is invalid.
             UnwritableFileError: If a file is there already, or cannot be written.
         """
-        from robot_layouts.motion.output.export import to_csv
+        from robot_layouts.motion.output.files import to_csv
 
         return to_csv(self, folder, frequency)
 
@@ -297,11 +297,11 @@ class Motion:
             The files.
 
         Raises:
-            AssetError: If a robot's files cannot be found or make no sense.
-            MotionError: If the frequency makes no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
+            MotionError: If the frequency is invalid.
             UnwritableFileError: If a file is there already, or cannot be written.
         """
-        from robot_layouts.motion.output.export import to_ros2
+        from robot_layouts.motion.output.files import to_ros2
 
         return to_ros2(self, folder, frequency)
 

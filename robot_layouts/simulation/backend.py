@@ -322,7 +322,7 @@ class Backend(Protocol):
         """Return which links of different arms touched since it was last asked.
 
         Raises:
-            SimulationError: If nobody looks at that; see `watch_arms`.
+            SimulationError: If arms are not watched; see `watch_arms`.
         """
         ...
 

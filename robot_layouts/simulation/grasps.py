@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
+from math import cos, hypot, radians, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -10,6 +13,27 @@ import torch
 from robot_layouts.simulation.maths import Flags, Floats
 from robot_layouts.simulation.rotations import rotation_matrix
 from robots import Fingers
+from robots.descriptor import Vector3
+
+# So near to a threshold native's float32 decides: it is at most a tenth of this away from what
+# a plain float gives. Of the force (N, and as a share of it) and of the angle's cosine.
+NEAR_FORCE, NEAR_COSINE = 1e-4, 1e-5
+LARGEST = 1e9  # N, and of a quaternion's entries: float32 holds the square of neither much longer
+FEW = 32  # worlds up to which plain floats take less time than torch: half of it for so many
+
+
+class _Thresholds(NamedTuple):
+    """What a finger's force is compared with.
+
+    Attributes:
+        opening: Direction in which it opens, in the frame of its link; of length 1.
+        force: Smallest force (N).
+        cosine: Of the largest angle.
+    """
+
+    opening: Vector3
+    force: float
+    cosine: float
 
 
 def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
@@ -24,14 +48,78 @@ def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
         Shape (N,), bool.
     """
     held = np.logical_and.reduce(np.logical_or.reduce(forces != 0, 2), 0)
-    if touched := np.flatnonzero(held).tolist():  # angles cost much, and few worlds need them
-        held[touched] = _strong_and_straight(
-            fingers, forces[:, touched], [pose[touched] for pose in poses]
+    touched = np.flatnonzero(held).tolist()  # angles cost much, and few worlds need them
+    unclear = touched
+    if len(touched) <= FEW:
+        unclear = []
+        for env in touched:
+            clear = _clearly_held(fingers, forces[:, env], [pose[env] for pose in poses])
+            if clear is None:
+                unclear.append(env)
+            else:
+                held[env] = clear
+    if unclear:
+        held[unclear] = _strong_and_straight(
+            fingers, forces[:, unclear], [pose[unclear] for pose in poses]
         )
     return held
 
 
+def _clearly_held(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> bool | None:
+    """Tell whether two fingers hold a body in one world; None if that is near a threshold.
+
+    Args:
+        fingers: Which way they open, and the thresholds.
+        forces: Force on each finger, shape (2, 3) (N, world frame).
+        poses: Pose of each finger link, each (7,).
+    """
+    clear: bool | None = True
+    for limits, force, pose in zip(_thresholds(fingers), forces.tolist(), poses, strict=True):
+        one = _clearly_presses(limits, force, pose.tolist())
+        if one is False:
+            return False
+        clear = clear and one
+    return clear
+
+
+def _clearly_presses(
+    limits: _Thresholds, force: Sequence[float], pose: Sequence[float]
+) -> bool | None:
+    """Tell whether one finger's force, (3,) (N), is strong and straight; None if that is near."""
+    (a, b, c), (fx, fy, fz), (_, _, _, w, x, y, z) = limits.opening, force, pose
+    strength = sqrt(fx * fx + fy * fy + fz * fz)
+    squared = w * w + x * x + y * y + z * z
+    near = NEAR_FORCE * (1 + limits.force)
+    if not (strength < LARGEST and 1 / LARGEST < squared < LARGEST):
+        return None
+    if strength < limits.force - near:
+        return False
+    if strength < limits.force + near:
+        return None
+    scale = 2 / squared
+    p, q, r = scale * (y * c - z * b), scale * (z * a - x * c), scale * (x * b - y * a)
+    along = (
+        fx * (a + w * p + y * r - z * q)
+        + fy * (b + w * q + z * p - x * r)
+        + fz * (c + w * r + x * q - y * p)
+    )
+    beyond = along - limits.cosine * strength
+    return None if abs(beyond) <= NEAR_COSINE * strength else beyond > 0
+
+
+@lru_cache(maxsize=256)
+def _thresholds(fingers: Fingers) -> list[_Thresholds]:
+    """Return what the force on each of two fingers is compared with."""
+    cosine = cos(radians(fingers.max_angle))
+    return [
+        _Thresholds((x / length, y / length, z / length), fingers.min_force, cosine)
+        for (x, y, z), sign in zip(fingers.opening_axes, fingers.opening_signs, strict=True)
+        for length in [sign * hypot(x, y, z)]
+    ]
+
+
 def _strong_and_straight(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
+    """Tell whether two fingers hold bodies, as native computes it; see `grasped`."""
     count = len(poses)
     signed = np.array(fingers.opening_axes) * np.array(fingers.opening_signs)[:, None]
     axes = np.repeat(signed.astype(np.float32), forces.shape[1], axis=0)

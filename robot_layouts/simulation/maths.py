@@ -271,7 +271,7 @@ def like(x: Array, values: Any) -> Any:
 
 
 def constant(x: Array, values: Floats) -> Any:
-    """Return an array of NumPy's that nobody changes as an array of the kind of another."""
+    """Return a constant NumPy array as an array of the kind of ``x``, whose memory it may share."""
     return torch.from_numpy(values).to(x.device) if isinstance(x, Tensor) else values
 
 

@@ -133,7 +133,7 @@ class PhysicsSettings:
         object.__setattr__(self, name, value)
 
 
-# What SAPIEN 3.0.3 uses when nobody configures it (read from a fresh process).
+# The defaults of SAPIEN 3.0.3 (read from a fresh process).
 SAPIEN_DEFAULTS = PhysicsSettings(
     contact_offset=0.01, position_iterations=10, friction=Friction(0.3, 0.3, 0.1)
 )

@@ -57,7 +57,7 @@ class Places(dict[str, Place]):
 
 
 class Declared(Generic[Key]):
-    """What somebody asks for after every step, numbered in the order in which it was first asked.
+    """What is asked for after every step, numbered in the order in which it was first asked.
 
     Attributes:
         keys: All of it; the same tuple until something new joins.
@@ -118,8 +118,8 @@ class ReadoutIndex:
     The frames are the backend's, then the tool centre points that lie between links. The joints of
     each robot are in the order of its descriptor.
 
-    The limbs of a robot are robots here, by their full names and, where these are nobody else's, by
-    their short ones; links and base are then those of the whole robot.
+    The limbs of a robot are robots here, by their full names and, where these are unique, by their
+    short ones; links and base are then those of the whole robot.
 
     Attributes:
         robots: What is known of each robot, in layout order.
@@ -259,7 +259,7 @@ class ReadoutIndex:
 
 
 class FramePairs:
-    """Pairs of frames that somebody asks the distance of, so that all are computed in one go.
+    """Pairs of frames whose distances are asked for, so that all are computed in one go.
 
     A task asks for the same distances after every step: from the second step on they are one
     subtraction and one norm over all pairs.

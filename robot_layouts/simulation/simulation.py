@@ -182,7 +182,7 @@ class Simulation:
 
         Raises:
             UnknownNameError: If there is no such body.
-            SimulationError: If there are more rows than worlds, or fewer, or a pose is none.
+            SimulationError: If there are more rows than worlds, or fewer, or a pose is invalid.
         """
         count, given = self.num_envs, (np.shape(positions), np.shape(where))
         if given != ((count, 3), (count,)):

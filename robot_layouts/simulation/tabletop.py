@@ -36,7 +36,7 @@ def add_table(world: World, *, textured: bool = True) -> None:
         textured: Whether pictures show wood; else the table is white.
 
     Raises:
-        AssetError: If the world has visuals and their files cannot be had.
+        AssetError: If the world has visuals and their files cannot be found.
     """
     drawn = world.visuals  # a box and a plane stand for mesh and texture where nothing is drawn
     box = Box(

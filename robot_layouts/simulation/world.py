@@ -22,7 +22,7 @@ _KINDS = get_args(BodyKind)
 
 
 @dataclass(frozen=True)
-class Body:
+class WorldBody:
     """A body that a task puts into the world.
 
     Attributes:
@@ -112,7 +112,7 @@ class World:
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
         self.visuals = visuals
-        self.bodies: dict[str, Body] = {}
+        self.bodies: dict[str, WorldBody] = {}
         self.design: Any = None
         self.scales: Mapping[str, float] = {}
         self.links_pass = links_pass
@@ -128,7 +128,7 @@ class World:
         quaternion: Quaternion = IDENTITY,
         anchored: bool = False,
         marker: bool = False,
-    ) -> Body:
+    ) -> WorldBody:
         """Add a body made of shapes.
 
         Args:
@@ -150,11 +150,11 @@ class World:
         scale = self.scales.get(name, 1.0)
         if scale != 1.0:
             shapes = tuple(scaled(shape, scale) for shape in shapes)
-        body = Body(name, shapes, kind, position, quaternion, anchored, marker, scale)
+        body = WorldBody(name, shapes, kind, position, quaternion, anchored, marker, scale)
         self.bodies[name] = body
         return body
 
-    def body(self, name: str) -> Body:
+    def body(self, name: str) -> WorldBody:
         """Return a body by name.
 
         Raises:

@@ -45,7 +45,7 @@ class UrdfPart:
     root: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse a pose that is none."""
+        """Refuse an invalid pose."""
         what = f"what is fixed to {self.link!r}"
         position = check(self.position, Vector3, f"{what}: position", DescriptorError)
         quaternion = check(self.quaternion, Quaternion, f"{what}: quaternion", DescriptorError)
@@ -78,7 +78,7 @@ class AssembledUrdf:
             pictures: Whether the visual meshes are needed too.
 
         Raises:
-            AssetError: If the files of a part cannot be found or make no sense.
+            AssetError: If the files of a part cannot be found or are invalid.
             UnknownNameError: If a link that carries a part, or is cut off, does not exist.
             DescriptorError: If two parts have a link or joint of the same name, or nothing is left.
             UnwritableFileError: If the folder cannot be written.

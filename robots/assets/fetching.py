@@ -21,8 +21,8 @@ def locate(package: str, urdf: str, *, pictures: bool) -> Path:
 
     Raises:
         UnknownNameError: If the manifest has no such package or URDF.
-        AssetError: If some file could not be had from any source, or pictures are asked for of a
-            URDF whose visual meshes nobody has.
+        AssetError: If no source has some file, or pictures are asked for of a
+            URDF whose visual meshes are not published.
     """
     about = load_manifest().package(package)
     files = about.needed(urdf, pictures=pictures)
@@ -41,7 +41,7 @@ def locate_file(package: str, path: str) -> Path:
 
     Raises:
         UnknownNameError: If the manifest has no such package or file.
-        AssetError: If it could not be had from any source.
+        AssetError: If no source has it.
     """
     about = load_manifest().package(package)
     file, store = about.file(path), AssetStore(default_root())
@@ -79,7 +79,7 @@ def ensure(
         trust: Whether to accept files that differ from the manifest, and mark them.
 
     Raises:
-        AssetError: If some file could not be had, or not be written; names every source tried.
+        AssetError: If no source has some file, or it cannot be written; names every source tried.
     """
     if not store.unusable(files):
         return
@@ -151,7 +151,7 @@ class _Fetch:
         return different
 
     def _keep(self, file: AssetFile, data: bytes) -> None:
-        """Keep a file that nobody asked for, so that it need not be fetched another time."""
+        """Keep a file that came along with another, so that it need not be fetched later."""
         try:
             if self.room and self.store.state(file) is FileState.MISSING:
                 if self._accept(file, data, trust=False):
@@ -169,7 +169,7 @@ class _Fetch:
 
 
 def _expect_known_references(file: AssetFile, data: bytes) -> None:
-    """Refuse a differing URDF that needs files nobody would fetch."""
+    """Refuse a differing URDF that needs files which would not be fetched."""
     if not file.path.endswith(".urdf"):
         return
     around = f"/{file.origin.mount}/" if file.origin.mount else ""

@@ -29,7 +29,7 @@ class UrdfLocator:
 
         Raises:
             UnknownNameError: If the manifest has no such package or URDF.
-            AssetError: If a file could not be had from any source; names each and why.
+            AssetError: If no source has a file; says why of each source.
         """
         from robots.assets.fetching import locate
 
@@ -53,7 +53,7 @@ class FileLocator:
 
         Raises:
             UnknownNameError: If the manifest has no such package or file.
-            AssetError: If it could not be had from any source; says why of each.
+            AssetError: If no source has it; says why of each source.
         """
         from robots.assets.fetching import locate_file
 
@@ -98,7 +98,7 @@ def opened_path(path: str | os.PathLike[str], folder: str | os.PathLike[str] | N
     """Return the absolute path of a user's file, for which a folder is opened if one is given.
 
     Raises:
-        AssetError: If the folder is none.
+        AssetError: If there is no such folder.
     """
     from robots.urdf.paths import open_folder
 

@@ -91,7 +91,7 @@ class AssetPackage:
     Attributes:
         origin: Where they come from.
         files: The files.
-        undrawable: URDFs some of whose visual meshes nobody has; physics does not need them.
+        undrawable: URDFs some of whose visual meshes are not published; physics does not need them.
     """
 
     origin: PackageOrigin

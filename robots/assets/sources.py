@@ -1,4 +1,4 @@
-"""Where robot files can be had: another copy, an installed package, the Hub, a package's wheel."""
+"""Where robot files come from: another copy, an installed package, the Hub, a package's wheel."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class AssetSource(Protocol):
             again: Whether these files were wrong a moment ago, so that caches must be bypassed.
 
         Raises:
-            SourceError: If some file cannot be had; those that can be are yielded before.
+            SourceError: If the source lacks some file; those that it has are yielded before.
         """
         ...
 
@@ -192,7 +192,7 @@ class HubSource:
     def _commit(self, dataset: str) -> str:
         """Return the commit that the revision is now.
 
-        One quick request: if nobody answers it, no file is waited for.
+        One quick request: if it is not answered, no file is waited for.
         """
         from huggingface_hub import HfApi, constants
 

@@ -18,7 +18,7 @@ MOST_POINTS = 500  # of the polytope that grows within it
 _FIRST = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], float)
 
 
-class Overlap(NamedTuple):
+class Penetration(NamedTuple):
     """An overlap of two bodies.
 
     Attributes:
@@ -30,7 +30,7 @@ class Overlap(NamedTuple):
     points: Floats
 
 
-def overlap(one: Floats, other: Floats) -> Overlap:
+def overlap(one: Floats, other: Floats) -> Penetration:
     """Measure the overlap of two convex bodies; a depth of 0 if they do not overlap.
 
     A polytope grows within the bodies' Minkowski difference at the face that is nearest to the
@@ -50,7 +50,7 @@ def overlap(one: Floats, other: Floats) -> Overlap:
         a, b = _corner(one, other, normal)
         farther = float(normal @ (a - b))
         if farther <= 0.0:
-            return Overlap(0.0, np.array([a, b]))
+            return Penetration(0.0, np.array([a, b]))
         if farther + offset < NEAR_ENOUGH or len(corners) >= MOST_POINTS:
             break
         corners.append((a, b))
@@ -59,7 +59,7 @@ def overlap(one: Floats, other: Floats) -> Overlap:
     ends = np.array([corners[i] for i in hull.simplices[nearest]])  # (3, 2, 3)
     triangle = (ends[:, 0] - ends[:, 1]).T
     weights = np.linalg.lstsq(np.vstack([triangle, np.ones(3)]), [*(normal * depth), 1.0])[0]
-    return Overlap(depth, np.einsum("i,ijk->jk", weights, ends))
+    return Penetration(depth, np.einsum("i,ijk->jk", weights, ends))
 
 
 def _corner(one: Floats, other: Floats, direction: Floats) -> tuple[Floats, Floats]:

@@ -68,7 +68,7 @@ def load_model(robot: RobotDescriptor) -> RobotModel:
     """Return a robot's links and hulls; its files are read once, and again if they change.
 
     Raises:
-        AssetError: If its files cannot be found or make no sense.
+        AssetError: If its files cannot be found or are invalid.
         DescriptorError: If the descriptor and the URDF contradict each other.
         MissingPackageError: If python-fcl is not installed.
         UnknownNameError: If ``allowed_collisions`` names a link that the URDF lacks.

@@ -39,7 +39,7 @@ Joints = tuple[ModelJoint, ...]
 
 
 @dataclass(frozen=True)
-class Limb:
+class LimbJoints:
     """An arm, or a hand without one, each part in the order base to tip.
 
     Attributes:
@@ -67,7 +67,7 @@ class Anatomy:
     """
 
     base: Joints
-    limbs: tuple[Limb, ...]
+    limbs: tuple[LimbJoints, ...]
     parts: Mapping[str, Joints]
     reasons: tuple[str, ...]
 
@@ -118,7 +118,7 @@ class _Chain:
 
 
 @dataclass
-class _Search:
+class _TreeWalk:
     """A walk over the tree, and what it has come to so far."""
 
     model: UrdfModel
@@ -137,7 +137,7 @@ def find_anatomy(model: UrdfModel, urdf: str) -> Anatomy:
     """
     if not model.moving:
         raise DescriptorError(f"{urdf} has no joint that moves; there is nothing to drive")
-    search = _Search(model, Lengths(model))
+    search = _TreeWalk(model, Lengths(model))
     _walk(search, model.root, ())
     for chain in search.chains:
         chain.kind = chain.kind or _kind(chain, search.chains)
@@ -150,7 +150,7 @@ def find_anatomy(model: UrdfModel, urdf: str) -> Anatomy:
     return Anatomy(search.base, limbs, parts, tuple(search.reasons))
 
 
-def _walk(search: _Search, link: str, path: Joints) -> None:
+def _walk(search: _TreeWalk, link: str, path: Joints) -> None:
     """Follow the tree from a link; ``path`` are the joints since the base or the last branch."""
     nexts = search.model.moving_on(link)
     if not nexts:
@@ -167,7 +167,7 @@ def _walk(search: _Search, link: str, path: Joints) -> None:
         _branch(search, nexts, path)
 
 
-def _branch(search: _Search, nexts: Joints, path: Joints) -> None:
+def _branch(search: _TreeWalk, nexts: Joints, path: Joints) -> None:
     """Tell a body that carries limbs from an arm that carries something beside."""
     ranked = sorted(nexts, key=lambda joint: -search.lengths.behind(joint))
     main, beside = ranked[0], ranked[1:]
@@ -182,7 +182,7 @@ def _branch(search: _Search, nexts: Joints, path: Joints) -> None:
         _walk(search, joint.child, (joint,))
 
 
-def _is_accessory(search: _Search, joint: ModelJoint, path: Joints) -> bool:
+def _is_accessory(search: _TreeWalk, joint: ModelJoint, path: Joints) -> bool:
     """Tell whether a side branch is part of an arm: a strut that follows it, or a small thing."""
     behind = search.model.below(joint)
     names = _names(behind)
@@ -193,7 +193,7 @@ def _is_accessory(search: _Search, joint: ModelJoint, path: Joints) -> bool:
     return follows or (len(path) > 1 and len(behind) < 3 and not is_arm)
 
 
-def _is_of_base(search: _Search, joint: ModelJoint) -> bool:
+def _is_of_base(search: _TreeWalk, joint: ModelJoint) -> bool:
     """Tell whether a joint at the root moves the whole robot, by itself or with the next ones.
 
     One that turns does, too, if a slide of a base follows it, or if it turns in the place to which
@@ -222,7 +222,7 @@ def flies(joint: ModelJoint) -> bool:
     return joint.unit == "m" and high - low > FARTHEST_SLIDE
 
 
-def _is_hand(search: _Search, link: str, nexts: Joints, path: Joints) -> bool:
+def _is_hand(search: _TreeWalk, link: str, nexts: Joints, path: Joints) -> bool:
     """Tell whether a link that branches is a palm: what it carries is small, or called fingers."""
     behind = [search.model.below(joint) for joint in nexts]
     if any(_is_other(joints) for joints in behind):
@@ -249,7 +249,7 @@ def _is_other(joints: Joints) -> bool:
     return _share(joints, known) > 0.5 and not _share(joints, words.FINGER) > 0.5
 
 
-def _hand(search: _Search, nexts: Joints, path: Joints) -> _Chain:
+def _hand(search: _TreeWalk, nexts: Joints, path: Joints) -> _Chain:
     """Return the chain that ends in a hand; a joint that the fingers mimic belongs to the hand."""
     fingers = tuple(f for joint in nexts for f in search.model.below(joint))
     followed = {joint.mimics for joint in fingers}
@@ -290,7 +290,7 @@ def _many(chain: _Chain, chains: Sequence[_Chain]) -> bool:
     return alike >= 4 and any(len(other.joints) > count or other.fingers for other in chains)
 
 
-def _instead(search: _Search) -> list[_Chain]:
+def _instead(search: _TreeWalk) -> list[_Chain]:
     """Return what stands for arms in a robot that has none: legs, or what else moves."""
     for kind in ("legs", "body", "head", "torso", "wheels"):
         found = [chain for chain in search.chains if chain.kind == kind]
@@ -308,7 +308,7 @@ def _instead(search: _Search) -> list[_Chain]:
     return [_Chain(torso, palm=torso[-1].child, kind="arm")]
 
 
-def _with_jaw(search: _Search, chain: _Chain) -> _Chain:
+def _with_jaw(search: _TreeWalk, chain: _Chain) -> _Chain:
     """Make the last joint of an arm its gripper, if it is a jaw."""
     fingers_only = _share(chain.joints, words.JAW) > 0.5
     if len(chain.joints) > 1 and not (chain.fingers or fingers_only) and _is_jaw(chain.joints[-1]):
@@ -328,13 +328,13 @@ def _is_jaw(joint: ModelJoint) -> bool:
     return named and high - low <= WIDEST_JAW and not words.has(joint.name, words.WRIST)
 
 
-def _named(search: _Search, arms: Sequence[_Chain]) -> list[Limb]:
+def _named(search: _TreeWalk, arms: Sequence[_Chain]) -> list[LimbJoints]:
     """Return the limbs, named by side as their names say, else as they stand, else by numbers."""
     if len(arms) == 1:
         (chain,) = arms
         if not chain.joints and not search.torso:  # a hand that flies
             chain.joints, search.base = search.base, ()
-        return [Limb("", chain.joints, chain.fingers, chain.palm)]
+        return [LimbJoints("", chain.joints, chain.fingers, chain.palm)]
     sides = [words.side(_names(chain.joints or chain.fingers)) for chain in arms]
     if sorted(sides) != ["left", "right"]:
         across = [search.lengths.place((chain.joints or chain.fingers)[0])[1] for chain in arms]
@@ -350,18 +350,18 @@ def _named(search: _Search, arms: Sequence[_Chain]) -> list[Limb]:
                 )
             )
     return [
-        Limb(side, chain.joints, chain.fingers, chain.palm)
+        LimbJoints(side, chain.joints, chain.fingers, chain.palm)
         for side, chain in zip(sides, arms, strict=True)
     ]
 
 
-def _joints_of(search: _Search, part: str) -> Joints:
+def _joints_of(search: _TreeWalk, part: str) -> Joints:
     chains = [chain for chain in search.chains if chain.kind == part]
     joints = [joint for chain in chains for joint in (*chain.joints, *chain.fingers)]
     return (*(search.torso if part == "torso" else ()), *joints)
 
 
-def _explain(search: _Search, limbs: Iterable[Limb], parts: Mapping[str, Joints]) -> None:
+def _explain(search: _TreeWalk, limbs: Iterable[LimbJoints], parts: Mapping[str, Joints]) -> None:
     why = {
         "torso": "as limbs branch off behind it",
         "head": "by name",

@@ -9,7 +9,7 @@ import numpy as np
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, transform
 from robots.bodies.hulls import Hull
 from robots.guessing import words
-from robots.guessing.anatomy import Limb
+from robots.guessing.anatomy import LimbJoints
 from robots.guessing.doubt import Doubt
 from robots.guessing.stance import Stance
 from robots.parts import Fingers, GripperMaterial, Vector3
@@ -38,7 +38,7 @@ class Fingertips:
         solid: Whether shapes tell where the tips are, not frames alone.
     """
 
-    def __init__(self, stance: Stance, limb: Limb, hulls: Sequence[Hull]) -> None:
+    def __init__(self, stance: Stance, limb: LimbJoints, hulls: Sequence[Hull]) -> None:
         """Find the tips; ``hulls`` are the robot's, or empty to go by frames alone."""
         self.stance, self.limb = stance, limb
         self._poses = stance.poses(stance.middle)[0]
@@ -188,14 +188,14 @@ class Fingertips:
         return np.concatenate(corners) if corners else self._poses[rigid, :3, 3]
 
 
-def find_material(model: UrdfModel, limbs: Sequence[Limb]) -> GripperMaterial | None:
+def find_material(model: UrdfModel, limbs: Sequence[LimbJoints]) -> GripperMaterial | None:
     """Return the contact material of all fingers, as ManiSkill's grippers have it."""
     links = tuple(link for limb in limbs if limb.fingers for link in _finger_links(model, limb))
     return GripperMaterial(links, 2.0, 2.0, 0.0, patch_radius=0.1) if links else None
 
 
 def find_fingers(
-    limb: Limb, tips: Fingertips | None, postures: Sequence[Mapping[str, float]]
+    limb: LimbJoints, tips: Fingertips | None, postures: Sequence[Mapping[str, float]]
 ) -> tuple[Fingers | None, str]:
     """Return the two links that grasp, if a limb has two fingers or a thumb, and why.
 
@@ -238,7 +238,7 @@ def _axis_name(axis: Vector3) -> str:
     return f"{'xyz'[axis.index(1.0)]} axis" if sorted(axis) == [0.0, 0.0, 1.0] else f"{axis}"
 
 
-def _finger_links(model: UrdfModel, limb: Limb) -> tuple[str, ...]:
+def _finger_links(model: UrdfModel, limb: LimbJoints) -> tuple[str, ...]:
     """Return the links of a hand's fingers, with the pads that are fixed to them."""
     own = [joint.child for joint in limb.fingers]
     pads = [p for link in own for p in model.rigid_with(link)[1:] if p in model.collisions]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from robots.action_split import JointGroup
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
-from robots.guessing.anatomy import Limb
+from robots.guessing.anatomy import LimbJoints
 from robots.guessing.drives import (
     CONTROL_STEP,
     FORCE,
@@ -49,7 +49,7 @@ SPARE = 2.0  # how much more than its share of the force a leader may take to ke
 
 
 @dataclass(frozen=True)
-class Follower:
+class MimicJoint:
     """A joint that goes to multiplier · value + offset."""
 
     joint: ModelJoint
@@ -76,7 +76,7 @@ class Gripper:
     reasons: tuple[str, ...]
 
 
-def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
+def find_gripper(limb: LimbJoints, tips: Fingertips, drives: Drives) -> Gripper:
     """Return the groups of a hand: one number for what moves together, else one for each leader.
 
     Args:
@@ -104,7 +104,7 @@ def find_gripper(limb: Limb, tips: Fingertips, drives: Drives) -> Gripper:
 
 def entangled(
     stance: Stance,
-    limb: Limb,
+    limb: LimbJoints,
     hulls: Sequence[Hull],
     pairs: Sequence[tuple[int, int]],
     gripper: Gripper,
@@ -148,7 +148,7 @@ def entangled(
 
 
 def _usually(
-    stance: Stance, limb: Limb, hulls: Sequence[Hull], pairs: NDArray[np.intp]
+    stance: Stance, limb: LimbJoints, hulls: Sequence[Hull], pairs: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
     """Tell which pairs of a hand's hulls overlap in half of its random postures, (pairs,)."""
     leaders = [joint for joint in limb.fingers if joint.name in stance.index]
@@ -165,11 +165,11 @@ def _names(stance: Stance, hulls: Sequence[Hull], pairs: NDArray[np.intp]) -> li
     return list(dict.fromkeys((links[a], links[b]) for a, b in pairs))
 
 
-def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[Follower]]:
+def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[MimicJoint]]:
     """Return for each leading joint what follows it, itself first."""
     named = {joint.name: joint for joint in fingers}
-    groups: dict[str, list[Follower]] = {
-        joint.name: [Follower(joint, 1.0, 0.0)] for joint in fingers if joint.mimics not in named
+    groups: dict[str, list[MimicJoint]] = {
+        joint.name: [MimicJoint(joint, 1.0, 0.0)] for joint in fingers if joint.mimics not in named
     }
     for joint in fingers:
         if joint.name not in groups:
@@ -178,13 +178,13 @@ def _followers(fingers: Sequence[ModelJoint]) -> dict[str, list[Follower]]:
                 offset += multiplier * at.offset
                 multiplier *= at.multiplier
                 at = named[at.mimics or ""]
-            groups[at.name].append(Follower(joint, multiplier, offset))
+            groups[at.name].append(MimicJoint(joint, multiplier, offset))
     return groups
 
 
 def _merged(
-    leaders: Sequence[ModelJoint], followers: Mapping[str, Sequence[Follower]], tips: Fingertips
-) -> list[Follower]:
+    leaders: Sequence[ModelJoint], followers: Mapping[str, Sequence[MimicJoint]], tips: Fingertips
+) -> list[MimicJoint]:
     """Return what one number can drive, if the leaders are fingers that move alike or mirrored."""
     first = leaders[0]
     if len(leaders) < 2 or any(not _alike(first, joint) for joint in leaders[1:]):
@@ -199,7 +199,7 @@ def _merged(
         low, _ = joint.span
         offset = low - first.span[0] if sign > 0 else low + first.span[1]
         merged += [
-            Follower(f.joint, f.multiplier * sign, f.multiplier * _tidy(offset) + f.offset)
+            MimicJoint(f.joint, f.multiplier * sign, f.multiplier * _tidy(offset) + f.offset)
             for f in followers[joint.name]
         ]
     return merged
@@ -227,7 +227,7 @@ def _sense(first: ModelJoint, other: ModelJoint, tips: Fingertips) -> float:
 def _one(
     name: str,
     leader: ModelJoint,
-    followers: Sequence[Follower],
+    followers: Sequence[MimicJoint],
     tips: Fingertips,
     drives: Drives,
 ) -> tuple[JointGroup, tuple[dict[str, float], ...], tuple[str, ...]]:
@@ -240,7 +240,7 @@ def _one(
     opens_down = _apart(tips, followers, low) > _apart(tips, followers, high) + NOTICEABLE
     if opens_down:
         flipped = [
-            Follower(f.joint, -f.multiplier, f.multiplier * high + f.offset) for f in followers
+            MimicJoint(f.joint, -f.multiplier, f.multiplier * high + f.offset) for f in followers
         ]
         followers, low, high = flipped, 0.0, high - low
     joints = [f.joint for f in followers]
@@ -260,7 +260,7 @@ def _one(
 
 
 def _group(
-    followers: Sequence[Follower],
+    followers: Sequence[MimicJoint],
     span: tuple[float, float],
     drives: Sequence[Drive],
     *,
@@ -283,14 +283,14 @@ def _group(
     )
 
 
-def _apart(tips: Fingertips, followers: Sequence[Follower], lead: float) -> float:
+def _apart(tips: Fingertips, followers: Sequence[MimicJoint], lead: float) -> float:
     return tips.apart({f.joint.name: f.at(lead) for f in followers})
 
 
 def _many(
     name: str,
     leaders: Sequence[ModelJoint],
-    followers: Mapping[str, Sequence[Follower]],
+    followers: Mapping[str, Sequence[MimicJoint]],
     drives: Drives,
 ) -> Gripper:
     """Return the groups of a hand whose fingers move each on its own."""
@@ -320,7 +320,7 @@ def _many(
     return Gripper(groups, tuple(postures), (f"{name}: {counts}",))
 
 
-def _led_to(followers: Sequence[Follower], lead: float) -> dict[str, float]:
+def _led_to(followers: Sequence[MimicJoint], lead: float) -> dict[str, float]:
     """Return where joints go, each within its limits."""
     return {
         f.joint.name: min(max(_tidy(f.at(lead)), f.joint.span[0]), f.joint.span[1])
@@ -358,7 +358,7 @@ class Linkage:
 
 
 def find_linkage(
-    followers: Sequence[Follower], span: tuple[float, float], tips: Fingertips, drives: Drives
+    followers: Sequence[MimicJoint], span: tuple[float, float], tips: Fingertips, drives: Drives
 ) -> Linkage | None:
     """Return the linkage that joints are; None if in no finger one hangs on another.
 
@@ -379,7 +379,7 @@ def find_linkage(
     inertia = max(moved, press * travel * CONTROL_STEP**2 / (high - low))
     lead = (high - low) / CLOSING
 
-    def drive(follower: Follower) -> Drive:
+    def drive(follower: MimicJoint) -> Drive:
         joint, factor = follower.joint, abs(follower.multiplier)
         own = inertia / factor**2
         if joint.name not in leaders:
@@ -401,7 +401,7 @@ def _leaders(joints: Sequence[ModelJoint], tips: Fingertips) -> dict[str, str]:
     return {way[0]: end for end, way in ways.items() if way}
 
 
-def _press(followers: Sequence[Follower], fingers: int, travel: float) -> float:
+def _press(followers: Sequence[MimicJoint], fingers: int, travel: float) -> float:
     """Return the force with which each finger presses (N), by the motor's where it is given."""
     efforts = [abs(f.multiplier) * f.joint.effort for f in followers if f.joint.effort]
     return min(sum(efforts) / fingers / max(travel, LEAST), FORCE) if efforts else PRESS

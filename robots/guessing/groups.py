@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from robots.action_split import JointGroup
-from robots.guessing.anatomy import PARTS, Anatomy, Limb
+from robots.guessing.anatomy import PARTS, Anatomy, LimbJoints
 from robots.guessing.drives import Drive, Drives, alike, drive_fields
 from robots.urdf.model import ModelJoint
 
 
-def arm_groups(limb: Limb, drives: Drives) -> dict[str, JointGroup]:
+def arm_groups(limb: LimbJoints, drives: Drives) -> dict[str, JointGroup]:
     """Return the groups of a limb's arm: its joints that turn, and those that slide.
 
     Args:
@@ -76,7 +76,7 @@ def by_steps(
     )
 
 
-def name_of(limb: Limb, group: str) -> str:
+def name_of(limb: LimbJoints, group: str) -> str:
     """Return the name of a limb's group: ``arm``, ``left_arm``, or ``arm_2``."""
     if not limb.name:
         return group

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robots.guessing import words
-from robots.guessing.anatomy import FEWEST_ARM_JOINTS, Anatomy, Limb
+from robots.guessing.anatomy import FEWEST_ARM_JOINTS, Anatomy, LimbJoints
 from robots.urdf.model import ModelJoint, UrdfModel
 from robots.urdf.srdf import EndEffector, Semantics, SrdfGroup
 
@@ -159,7 +159,7 @@ def renamed(model: UrdfModel, found: Anatomy, names: Mapping[str, str]) -> Anato
     return Anatomy(found.base, kept, parts, tuple(reasons))
 
 
-def known_tip(model: UrdfModel, limb: Limb, hints: Hints) -> str:
+def known_tip(model: UrdfModel, limb: LimbJoints, hints: Hints) -> str:
     """Return the link that is known as a limb's end, if it lies beyond its palm; else nothing."""
     own = {joint.name for joint in limb.arm}
     tips = [hint.tip for hint in hints.limbs if own and own == set(hint.arm)]
@@ -222,11 +222,11 @@ def _named(hints: tuple[LimbHint, ...]) -> list[tuple[LimbHint, str]]:
     return list(zip(hints, names if good else map(str, range(1, len(hints) + 1)), strict=True))
 
 
-def _limb(hint: LimbHint, name: str, joints: dict[str, ModelJoint], model: UrdfModel) -> Limb:
+def _limb(hint: LimbHint, name: str, joints: dict[str, ModelJoint], model: UrdfModel) -> LimbJoints:
     arm = tuple(joints[joint] for joint in hint.arm)
     fingers = tuple(joints[joint] for joint in hint.fingers)
     if not fingers:
-        return Limb(name, arm, (), arm[-1].child)
+        return LimbJoints(name, arm, (), arm[-1].child)
     moved = {joint.child for joint in fingers}
     outer = [
         joint.parent
@@ -234,7 +234,7 @@ def _limb(hint: LimbHint, name: str, joints: dict[str, ModelJoint], model: UrdfM
         if moved.isdisjoint(before.child for before in model.path_to(joint.parent))
     ]
     carriers = outer or [fingers[0].parent]
-    return Limb(name, arm, fingers, max(dict.fromkeys(carriers), key=carriers.count))
+    return LimbJoints(name, arm, fingers, max(dict.fromkeys(carriers), key=carriers.count))
 
 
 def _without(group: tuple[ModelJoint, ...], taken: set[str]) -> tuple[ModelJoint, ...]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robot_layouts.kinematics.rotations import Floats
 from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
-from robots.guessing.anatomy import Limb, flies
+from robots.guessing.anatomy import LimbJoints, flies
 from robots.guessing.doubt import Doubt
 from robots.guessing.stance import Stance
 from robots.guessing.tool import Tool
@@ -40,7 +40,7 @@ NEARLY = 0.6  # rad; how near it must be to a quarter turn
 BESIDE = 0.35  # of the reach; how far the TCP may be to the side of what is ahead
 
 
-class View:
+class LimbView:
     """One limb: where its joints may be, and where they bring its TCP.
 
     Attributes:
@@ -55,7 +55,7 @@ class View:
         links: Indices of all links that it moves, in the robot's tree.
     """
 
-    def __init__(self, stance: Stance, limb: Limb, tool: Tool) -> None:
+    def __init__(self, stance: Stance, limb: LimbJoints, tool: Tool) -> None:
         """Take a limb with a joint of its own, and its tool centre point."""
         joints = [joint for joint in limb.arm if joint.mimics is None]
         self.free = [stance.index[joint.name] for joint in joints]
@@ -121,7 +121,7 @@ class PostureSearch:
     def __init__(
         self,
         stance: Stance,
-        tools: Sequence[tuple[Limb, Tool]],
+        tools: Sequence[tuple[LimbJoints, Tool]],
         hulls: Sequence[Hull],
         pairs: Sequence[tuple[int, int]],
         hands: Sequence[Sequence[Mapping[str, float]]],
@@ -143,13 +143,13 @@ class PostureSearch:
         self._front = np.array([1.0, 0.0, 0.0])
         self._generator = np.random.default_rng(0)
         self._torso = torso
-        self._views = [View(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
+        self._views = [LimbView(stance, limb, tool) for limb, tool in tools if _searchable(limb)]
         self._ground = self._lowest()
 
     def given(self, joints: Mapping[str, float], where: str) -> Posture:
         """Return a posture that is known, with the hands open, or a better one if it is no good.
 
-        It is none if links overlap in it, or with a little noise, or if a TCP is behind its limb.
+        It is no good if links overlap, in it or with a little noise, or a TCP is behind its limb.
 
         Args:
             joints: Where joints are (rad, m); the others stay where the search starts.
@@ -182,7 +182,7 @@ class PostureSearch:
             return "the TCP is behind the limb in it"
         return ""
 
-    def _is_behind(self, view: View, posture: Floats) -> bool:
+    def _is_behind(self, view: LimbView, posture: Floats) -> bool:
         """Tell whether a TCP is behind its shoulder, however a first upright joint is turned."""
         turned = posture.copy()
         if len(self._views) == 1 and view.is_upright:
@@ -291,7 +291,7 @@ class PostureSearch:
         ]
         return min([0.0, *body])
 
-    def _draw(self, view: View, posture: Floats) -> Floats:
+    def _draw(self, view: LimbView, posture: Floats) -> Floats:
         drawn = np.tile(posture, (DRAWS, 1))
         low, high = view.room
         drawn[:, view.free] = self._generator.uniform(low, high, (DRAWS, len(view.free)))
@@ -328,7 +328,7 @@ class PostureSearch:
             np.isfinite(self._cost(view, posture[None], strict=True)[0]) for view in self._views
         )
 
-    def _cost(self, view: View, postures: Floats, *, strict: bool = False) -> Floats:
+    def _cost(self, view: LimbView, postures: Floats, *, strict: bool = False) -> Floats:
         """Return how bad postures are, (postures,); infinite where they are no good at all."""
         poses, place = view.look(postures)
         out = place @ self._front / view.reach
@@ -350,7 +350,9 @@ class PostureSearch:
             bad |= (np.abs(at[:, view.bounded]) > 1 - MARGIN).any(axis=1)
         return np.where(bad, np.inf if strict else cost + 10.0, cost)
 
-    def _best(self, view: View, posture: Floats, drawn: Floats, pairs: NDArray[np.intp]) -> Floats:
+    def _best(
+        self, view: LimbView, posture: Floats, drawn: Floats, pairs: NDArray[np.intp]
+    ) -> Floats:
         """Return the best posture of one limb that overlaps nothing, else the one that does least.
 
         Each round leaves out the postures with overlaps that the last round met.
@@ -374,7 +376,7 @@ class PostureSearch:
         return min(counts)[3]
 
     def _near(
-        self, view: View, posture: Floats, pairs: NDArray[np.intp], room: float = ROOM
+        self, view: LimbView, posture: Floats, pairs: NDArray[np.intp], room: float = ROOM
     ) -> int:
         """Return how many of some small motions of a limb make something overlap."""
         count = len(view.free)
@@ -384,7 +386,7 @@ class PostureSearch:
         moved[:, view.free] += np.where(view.slides, moves * room, moves)
         return sum(self._any(poses, pairs) for poses in self._stance.poses(moved))
 
-    def _without(self, pairs: NDArray[np.intp], drawn: Floats, view: View) -> Floats:
+    def _without(self, pairs: NDArray[np.intp], drawn: Floats, view: LimbView) -> Floats:
         """Return the best of some postures in which some pairs do not overlap, or all if none."""
         order = np.argsort(self._cost(view, drawn), kind="stable")[: DRAWS // 4]
         if not len(pairs):
@@ -393,7 +395,7 @@ class PostureSearch:
         free = [i for i, at in zip(order, poses, strict=True) if not self._any(at, pairs)]
         return drawn[free] if free else drawn
 
-    def _refined(self, view: View, drawn: Floats) -> Floats:
+    def _refined(self, view: LimbView, drawn: Floats) -> Floats:
         low, high = view.room
         pool = drawn[np.argsort(self._cost(view, drawn), kind="stable")[:BEST]]
         spread = 0.15 * (high - low)
@@ -418,7 +420,7 @@ class PostureSearch:
         return np.asarray(overlapping(self._hulls, self._stance.poses(posture)[0], pairs), bool)
 
 
-def _searchable(limb: Limb) -> bool:
+def _searchable(limb: LimbJoints) -> bool:
     """Tell whether a limb has an arm of its own, which stands somewhere."""
     own = [joint for joint in limb.arm if joint.mimics is None]
     return len(own) > 1 and not any(map(flies, limb.arm))

@@ -12,7 +12,7 @@ from robot_layouts.kinematics.rotations import Floats, inverse_pose, transform
 from robot_layouts.kinematics.solve import farthest
 from robot_layouts.kinematics.tree import Tree
 from robots.guessing import words
-from robots.guessing.anatomy import Limb, flies
+from robots.guessing.anatomy import LimbJoints, flies
 from robots.guessing.doubt import Doubt
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.stance import Stance
@@ -51,7 +51,7 @@ class Tool:
 
 def find_tool(
     stance: Stance,
-    limb: Limb,
+    limb: LimbJoints,
     tips: Fingertips | None,
     *,
     between: float = BETWEEN,
@@ -98,7 +98,7 @@ def _first_rigid(stance: Stance, link: str) -> str:
     return link
 
 
-def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
+def _end(stance: Stance, limb: LimbJoints, rigid: list[str], which: str) -> Tool:
     """Return the end of an arm without gripper."""
     ranks = (
         lambda link: "tool" in words.words(link),
@@ -128,7 +128,7 @@ def _end(stance: Stance, limb: Limb, rigid: list[str], which: str) -> Tool:
 
 
 def _between(
-    stance: Stance, limb: Limb, rigid: list[str], tips: Fingertips, which: str, near: float
+    stance: Stance, limb: LimbJoints, rigid: list[str], tips: Fingertips, which: str, near: float
 ) -> Tool:
     """Return the frame, or the mean of two, that lies nearest between the finger tips."""
     middle, everywhere = tips.middle(), stance.places(stance.tree.links)
@@ -171,7 +171,7 @@ def _named(stance: Stance, tips: Fingertips, which: str, link: str, distance: fl
 
 def _mean(
     stance: Stance,
-    limb: Limb,
+    limb: LimbJoints,
     links: tuple[str, ...],
     which: str,
     distance: float,
@@ -183,7 +183,7 @@ def _mean(
     return Tool(limb.palm, links, Doubt(reason + apart) if apart else reason)
 
 
-def _beside(stance: Stance, limb: Limb, which: str, distance: float, middle: Floats) -> Tool:
+def _beside(stance: Stance, limb: LimbJoints, which: str, distance: float, middle: Floats) -> Tool:
     """Return the place between the finger tips as seen from the palm."""
     reason = (
         f"{which}: {distance * 100:.0f} cm from the link {limb.palm}, where the finger tips meet"
@@ -221,7 +221,7 @@ def _apart(distance: float, offset: Vector3) -> str:
     )
 
 
-def find_base(model: UrdfModel, limb: Limb, rest: Mapping[str, float]) -> Vector3:
+def find_base(model: UrdfModel, limb: LimbJoints, rest: Mapping[str, float]) -> Vector3:
     """Return where a limb's first joint is, in the robot's frame (m).
 
     Args:
@@ -238,7 +238,7 @@ def find_base(model: UrdfModel, limb: Limb, rest: Mapping[str, float]) -> Vector
 
 def find_reach(
     model: UrdfModel,
-    limb: Limb,
+    limb: LimbJoints,
     tool: Tool,
     rest: Mapping[str, float],
     base: Vector3 = (0.0, 0.0, 0.0),

@@ -90,12 +90,12 @@ def locate(path: Path) -> Path:
 
 @lru_cache(maxsize=KEPT)
 def _convert(path: Path, text: MjcfText) -> Converted:
-    model, mended = compiled(text, path)
+    model, repaired = compiled(text, path)
     robot = find_robot(model, path)
     couplings = find_couplings(robot, path)
     urdf = write_urdf(robot, couplings, find_efforts(robot), text.name)
     rubbing = dry_friction(robot)
-    notes = [*_doubtful(robot), *mended, *robot.notes, *couplings.notes, *urdf.notes]
+    notes = [*_doubtful(robot), *repaired, *robot.notes, *couplings.notes, *urdf.notes]
     if rubbing:
         notes.append(
             f"dry friction of {', '.join(rubbing)} is left out: PhysX has none in N·m or N"

@@ -73,10 +73,10 @@ def find_couplings(robot: MjcfRobot, path: Path) -> Couplings:
         AssetError: If a joint follows another in no nearly straight line, or a closed loop has no
             single joint that leads.
     """
-    return _Search(robot, path).run()
+    return _CouplingSearch(robot, path).run()
 
 
-class _Search:
+class _CouplingSearch:
     """The search for what follows what in one robot."""
 
     def __init__(self, robot: MjcfRobot, path: Path) -> None:

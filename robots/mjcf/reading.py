@@ -85,10 +85,10 @@ def read_mjcf(path: Path) -> MjcfText:
         AssetError: If a file of it cannot be read, is no MJCF, lies outside of its folder and its
             package, or there are too many; or if it has elements that make no robot.
     """
-    return _Reading(path).text()
+    return _MjcfReading(path).text()
 
 
-class _Reading:
+class _MjcfReading:
     """One MJCF that is being read."""
 
     def __init__(self, path: Path) -> None:
@@ -256,7 +256,7 @@ def without_log() -> Generator[None]:
 
 
 def compiled(text: MjcfText, path: Path) -> tuple[Model, tuple[str, ...]]:
-    """Return the model that MuJoCo makes of an MJCF, and what was mended in it.
+    """Return the model that MuJoCo makes of an MJCF, and what was repaired in it.
 
     Args:
         text: The MJCF.

@@ -44,7 +44,7 @@ def expect_readable(root: Element, urdf: str) -> None:
 
     Raises:
         AssetError: If names are missing, repeated or unknown, attributes are not the numbers that
-            they should be, a shape is none, a body has no possible mass, or joints make no tree.
+            they should be, a shape is invalid, a body has no possible mass, or joints make no tree.
     """
     links, joints = root.findall("link"), root.findall("joint")
     if len(links) > MAX_LINKS:

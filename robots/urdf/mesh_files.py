@@ -1,8 +1,8 @@
 """Reads mesh files that may come from anyone, before and for any program that draws or cooks them.
 
 SAPIEN says only in its log that it cannot read a mesh, and leaves the shape out. So each mesh is
-read here first, by trimesh, for whoever uses it: physics, checks and pictures refuse the same
-files for the same reasons.
+read here first, by trimesh: physics, checks and pictures refuse the same files for the same
+reasons.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ class _SideFiles:
         self._folders = {posixpath.dirname(file) for file in (urdf, path) if file}
 
     def expect_allowed(self, ending: str, contents: bytes) -> None:
-        """Refuse a file that names others which may not be opened, whoever would open them.
+        """Refuse a file that names others which no program may open.
 
         One that is missing is as good as none: paths on its author's disk are common.
         """

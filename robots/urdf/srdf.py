@@ -96,12 +96,12 @@ def read_semantics(srdf: Path, model: UrdfModel) -> Semantics:
         model: What the robot's URDF describes.
 
     Raises:
-        AssetError: If it cannot be read, is no SRDF, has numbers that are none, or groups that are
-            made of themselves.
-        UnknownNameError: If a group, a chain or a state names what there is not.
+        AssetError: If it cannot be read, is no SRDF, has a word where a number is needed, or groups
+            that contain themselves.
+        UnknownNameError: If a group, a chain or a state names what does not exist.
     """
     root = parse_urdf(read_urdf(srdf), str(srdf))
-    reading = _Reading(root, model, srdf)
+    reading = _SrdfReading(root, model, srdf)
     return Semantics(
         groups={name: reading.group(name) for name in reading.elements},
         end_effectors=tuple(map(reading.end_effector, root.iterfind("end_effector"))),
@@ -110,7 +110,7 @@ def read_semantics(srdf: Path, model: UrdfModel) -> Semantics:
     )
 
 
-class _Reading:
+class _SrdfReading:
     """One SRDF that is being read."""
 
     def __init__(self, root: Element, model: UrdfModel, srdf: Path) -> None:
@@ -174,7 +174,7 @@ def read_excluded_pairs(urdf: Path) -> tuple[ExcludedPair, ...]:
     """Return the pairs that the SRDF beside a URDF excludes, in its order; none without an SRDF.
 
     Raises:
-        AssetError: If the SRDF cannot be read or is none, or a pair lacks a link.
+        AssetError: If the file cannot be read or is no SRDF, or a pair lacks a link.
     """
     srdf = srdf_beside(urdf)
     return () if srdf is None else _excluded(parse_urdf(read_urdf(srdf), str(srdf)), srdf)

@@ -77,8 +77,8 @@ def numbers_of(
             `LARGEST`.
 
     Raises:
-        AssetError: If there are more or fewer numbers, or some that are none, not finite, or
-            larger.
+        AssetError: If there are more or fewer numbers, or some word is no number, or one that is
+            not finite or too large.
     """
     if element is None or element.get(attribute) is None:
         return default

@@ -24,7 +24,7 @@ class ActionReader:
         self._split = layout.action_split
         self._width = layout.action_dim
         self.checked: NDArray[np.float32] | None = None
-        """An array, (N, A), whose numbers were checked by whoever writes them there."""
+        """An array, (N, A), whose numbers were checked by the code that writes them there."""
 
     def read(
         self, action: Any, env_ids: NDArray[np.integer[Any]] | None = None

@@ -55,7 +55,7 @@ def checked_size(what: str, value: Any) -> Size:
     """Return a size of pictures.
 
     Raises:
-        TaskError: If it is none.
+        TaskError: If it is not a size.
     """
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != 2:
         raise TaskError(f"{what} is {shown(value)}; width and height (pixels) are needed")

@@ -92,7 +92,7 @@ def wants_rebuild(options: Mapping[str, Any] | None) -> bool:
     """Return whether the options of a reset ask for new worlds.
 
     Raises:
-        TaskError: If they make no sense, or one does not exist.
+        TaskError: If they are invalid, or one does not exist.
     """
     known = own_options(options)
     for key in options or ():
@@ -272,7 +272,7 @@ class ReturnedReward:
         """Return a reward as float32.
 
         Raises:
-            TaskError: If it is none; says what it must be.
+            TaskError: If it is not a valid reward; says what it must be.
         """
         if type(reward) is not np.ndarray or reward.dtype != self.dtype:
             reward = self._looked_at(reward)
@@ -310,7 +310,7 @@ _EFFECTS = {
 
 
 def expect_nothing(task: object, method: str, returned: object) -> None:
-    """Refuse that a method returns something that nobody would look at.
+    """Refuse that a method returns something, which would be ignored.
 
     Args:
         task: Whose method.

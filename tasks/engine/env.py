@@ -38,7 +38,7 @@ from tasks.engine.divergence import (
     refuse_state,
 )
 from tasks.engine.observation import Observer, read_mode, space_of
-from tasks.engine.places import built_layout, is_tested, refuse_collisions
+from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import Info, Memory, Task
@@ -129,6 +129,8 @@ class TaskEnv(Remade):
         self.task = task = object.__new__(task_class)
         self.scenario = task.scenario = scenario
         self.layout = task.layout = layout
+        if task_class.fits_robots:
+            vars(task).update(fitted(task_class, layout))
         mode = scenario.layout.control_mode(scenario.control_mode)
         self.control_mode = task.control_mode = mode
         self.num_envs = task.num_envs = scenario.num_envs
@@ -260,7 +262,7 @@ class TaskEnv(Remade):
             Observation and info of all environments.
 
         Raises:
-            TaskError: If an argument makes no sense; nothing is reset then.
+            TaskError: If an argument is invalid; nothing is reset then.
         """
         ids = checked_ids(env_ids, self.num_envs)
         seeds = checked_seeds(seed, ids)

@@ -109,8 +109,8 @@ def read_mode(name: str) -> ObservationMode:
     forms = [form for form in STATE_FORMS if form in parts]
     if not textures or len(forms) > 1 or len(set(parts)) != len(parts):
         raise TaskError(
-            f"obs_mode {name!r} makes no sense: at least one of {', '.join(TEXTURES)} and at most"
-            f" one of {', '.join(STATE_FORMS)}, each once"
+            f"obs_mode {name!r} is invalid; it needs at least one of {', '.join(TEXTURES)} and at"
+            f" most one of {', '.join(STATE_FORMS)}, each once"
         )
     return ObservationMode(textures, flat="state" in forms, privileged=bool(forms))
 

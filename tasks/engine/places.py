@@ -6,11 +6,14 @@ import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 from layouts import Layout
 from robots import LayoutError, MissingPackageError, RobotDescriptor, TaskError
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import Task
+from tasks.language.bodies import Body
+from tasks.language.fitting import fit_to
 from tasks.language.needs import ACT, HOLD, Needs
 
 EVERY_PLACE = "*"  # key of a task's needs
@@ -27,9 +30,30 @@ def built_layout(task_class: type[Task], scenario: Scenario) -> Layout:
     name, given, places = task_class.__name__, scenario.layout, task_class.layout.places
     counts, needs = task_class.robot_counts, task_class.needs
     check_places(name, given, places, counts, scenario.bystanders)
+    if task_class.fits_robots:
+        needs = {place: replace(need, opening=None) for place, need in needs.items()}
     check_needs(name, given, given.places if counts else places, needs)
     still = _settled(given, places, counts, scenario.bystanders)
     return still.in_control_mode(scenario.control_mode)
+
+
+def fitted(task_class: type[Task], layout: Layout) -> dict[str, Any]:
+    """Return what differs in a task that fits other robots than its own, by attribute.
+
+    Its fit, and its bodies with their sizes and places; nothing for its own robots.
+
+    Raises:
+        TaskError: If no place is in reach of all arms.
+    """
+    held = max((need.opening or 0.0 for need in task_class.needs.values()), default=0.0)
+    fit = fit_to(layout, task_class.layout, held)
+    if fit.as_declared:
+        return {}
+    bodies = {
+        name: body.fitted(fit) if isinstance(body, Body) else body
+        for name, body in task_class.bodies.items()
+    }
+    return {"fit": fit, "bodies": bodies, **bodies}
 
 
 def check_places(

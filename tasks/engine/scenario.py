@@ -178,7 +178,7 @@ def check_control_mode(layout: Layout, mode: object) -> None:
     """Refuse what is no control mode of a layout's robots.
 
     Raises:
-        TaskError: If it is none, or names an arm that there is not.
+        TaskError: If it is not a control mode, or names an arm that does not exist.
     """
     if not isinstance(mode, Mapping):
         known = dict.fromkeys(m for p in layout.values() for m in p.robot.modes)

@@ -15,6 +15,7 @@ from robot_layouts.simulation.maths import Array, Floats, copy
 from robots import UnknownNameError
 from tasks.engine.scenario import Scenario
 from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
+from tasks.language.fitting import AS_DECLARED, Fit
 from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
 from tasks.randomization.declaration import Randomization
@@ -53,7 +54,7 @@ class Memory(SimpleNamespace):
             if name not in vars(self) or len(env_ids) == len(rows):
                 setattr(self, name, copy(rows))
             else:
-                kept = copy(getattr(self, name))  # somebody may hold the earlier one
+                kept = copy(getattr(self, name))  # the task may still hold the earlier one
                 kept[list(env_ids)] = rows[list(env_ids)]
                 setattr(self, name, kept)
 
@@ -86,6 +87,9 @@ class Task:
             exactly the places of ``layout``.
         needs: What places need of their robots, by place, ``"*"`` for all others; see
             `tasks.Needs`.
+        fits_robots: Whether its places and sizes fit the robots that it is made with; they are
+            declared in numbers for those of ``layout``.
+        fit: In methods, how they do: `tasks.Fit`.
         physics: Solver settings; None keeps SAPIEN's own defaults.
         randomization: What varies from episode to episode; None for nothing.
         max_episode_steps: Control steps until an episode is truncated.
@@ -126,6 +130,8 @@ class Task:
     bodies: ClassVar[Mapping[str, Declared]] = {}
     robot_counts: ClassVar[range | None] = None
     needs: ClassVar[Mapping[str, Needs]] = {}
+    fits_robots: ClassVar[bool] = False
+    fit: Fit = AS_DECLARED
     physics: ClassVar[PhysicsSettings | None] = None
     randomization: ClassVar[Randomization | None] = None
     max_episode_steps: int

@@ -94,7 +94,7 @@ def sb3_vec_env(
         UnknownNameError: If the task, a place, a robot or a field is unknown.
         TaskError: If the task cannot be made like that.
         AssetError: If robot files cannot be found.
-        WorkerError: If a worker ends before it is ready.
+        VectorWorkerError: If a worker ends before it is ready.
     """
     try:
         from tasks.interfaces.sb3 import SB3Task
@@ -128,7 +128,7 @@ def lerobot_vec_env(
         UnknownNameError: If the task, a place, a robot or a field is unknown.
         TaskError: If the task cannot be made like that.
         AssetError: If robot files cannot be found.
-        WorkerError: If a worker ends before it is ready.
+        VectorWorkerError: If a worker ends before it is ready.
     """
     from tasks.interfaces.lerobot import LeRobotTask
 

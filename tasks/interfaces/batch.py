@@ -32,7 +32,7 @@ _ALIGNMENT = 64  # bytes; two arrays never share a cache line
 
 
 @dataclass(frozen=True)
-class Part:
+class BatchPart:
     """Which part of a vector a batch is, and how to make it; can be pickled.
 
     Attributes:
@@ -60,7 +60,7 @@ class Part:
 class Batch:
     """Environments of one process; each call leaves what it found in their rows of arrays."""
 
-    def __init__(self, part: Part) -> None:
+    def __init__(self, part: BatchPart) -> None:
         """Make the task, with the first seeds that it has in one large batch.
 
         Raises:

@@ -87,7 +87,7 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
 
         Raises:
             TaskError: If an argument is not valid; nothing is reset then.
-            WorkerError: If workers die, hang or fail.
+            VectorWorkerError: If workers die, hang or fail.
         """
         if options is None or isinstance(options, Mapping):
             options = {RECONFIGURE: True, **(options or {})}
@@ -113,7 +113,7 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
-            WorkerError: If workers die, hang or fail.
+            VectorWorkerError: If workers die, hang or fail.
         """
         observation, reward, terminated, truncated, info = self.vector.step(actions)
         running = ~(self._terminated | self._truncated)
@@ -130,7 +130,7 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
 
         Raises:
             TaskError: If it was not made with ``render_mode="rgb_array"``.
-            WorkerError: If workers die, hang or fail.
+            VectorWorkerError: If workers die, hang or fail.
         """
         return self.vector.render()
 

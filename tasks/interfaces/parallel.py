@@ -168,7 +168,7 @@ class ParallelTask(OneEnvironment, ParallelEnv[str, Observation, NDArray[np.floa
         robots = tuple(f"{robot}.{CONTROLLER}." for robot in self.task.layout)
 
         def places(robot: str) -> list[NDArray[np.intp]]:
-            """Return what a robot's targets and everybody's parts are in the observation."""
+            """Return where the observation has a robot's targets, and the parts for all robots."""
             return [
                 np.arange(part.start, part.stop)
                 for key, part in slices.items()

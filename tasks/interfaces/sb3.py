@@ -78,7 +78,7 @@ class SB3Task(Remade, VecEnv):
 
         Raises:
             TaskError: If a seed or an option is not valid; nothing is reset then.
-            WorkerError: If workers die, hang or fail.
+            VectorWorkerError: If workers die, hang or fail.
         """
         rebuilt = np.array([own_options(options)[RECONFIGURE] for options in self._options])
         obs: Any = None
@@ -113,7 +113,7 @@ class SB3Task(Remade, VecEnv):
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
             SimulationError: If `step_async` has given no actions since the last step.
-            WorkerError: If workers die, hang or fail.
+            VectorWorkerError: If workers die, hang or fail.
         """
         if self._actions is None:
             raise SimulationError("step_wait() has no actions; give them to step_async() before it")

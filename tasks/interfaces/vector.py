@@ -23,9 +23,9 @@ from tasks.engine.checks import RECONFIGURE, SUCCESS, checked_options, checked_s
 from tasks.engine.observation import space_of
 from tasks.engine.places import built_layout
 from tasks.engine.remade import Remade
-from tasks.interfaces.batch import FINAL, INFO, OBSERVATION, Part
+from tasks.interfaces.batch import FINAL, INFO, OBSERVATION, BatchPart
 from tasks.interfaces.gymnasium import RENDER_MODES
-from tasks.interfaces.workers import InProcess, WorkerError, Workers, partition
+from tasks.interfaces.workers import InProcess, VectorWorkerError, Workers, partition
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
 
@@ -68,8 +68,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     `step` waits for all environments. `send` gives actions to any of them, and `recv` returns the
     first ``batch_size`` that are ready.
 
-    A worker that dies, hangs or fails is reported as a `WorkerError` with its environments and
-    their seeds. The others are as if nothing had happened, and `restart` replaces it. If Ctrl-C
+    A worker that dies, hangs or fails is reported as a `VectorWorkerError` with its environments
+    and their seeds. The others are as if nothing had happened, and `restart` replaces it. If Ctrl-C
     interrupts a call, some environments may have taken the step and others not.
 
     One thread at a time may call it, in the process that made it: a fork needs one of its own. It
@@ -121,7 +121,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             UnknownNameError: If the task, a place, a robot or a field is unknown.
             TaskError: If the task cannot be made like that.
             AssetError: If robot files cannot be found.
-            WorkerError: If a worker ends before it is ready.
+            VectorWorkerError: If a worker ends before it is ready.
         """
         self.busy = Lock()
         mode = _checked_mode(autoreset_mode)
@@ -141,7 +141,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._everywhere = np.ones(num_envs, bool)
         self.batch_size = _checked_batch_size(batch_size, num_envs)
         parts = [
-            [Part(cls, scenario, ids.start, ids.stop, mode, ignore_terminations) for ids in own]
+            [BatchPart(cls, scenario, i.start, i.stop, mode, ignore_terminations) for i in own]
             for own in partition(num_envs, workers, self.batch_size)
         ]
         for placement in layout.values():  # fetched here, not by all workers at once
@@ -177,7 +177,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Raises:
             TaskError: If an argument is not valid; nothing is reset then.
-            WorkerError: If workers die, hang or fail.
+            VectorWorkerError: If workers die, hang or fail.
         """
         mask, reconfigure = self._checked_options(options)
         everyone = range(self.num_envs)
@@ -207,7 +207,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
             SimulationError: If environments were sent actions and not received since.
-            WorkerError: If workers die, hang or fail; its ``results`` are what the others give.
+            VectorWorkerError: If workers die, hang or fail; its ``results`` are the others'.
         """
         self._expect_workers()
         self._expect_idle(self._backend.pending.env_ids)
@@ -227,7 +227,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
             TaskError: If there is no such environment, or one is named twice.
             SimulationError: If one was sent an action before and not received since.
-            WorkerError: If workers are gone.
+            VectorWorkerError: If workers are gone.
         """
         self._expect_workers()
         ids = self._checked_ids(env_ids)
@@ -250,8 +250,8 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Raises:
             SimulationError: If fewer environments were sent actions.
-            WorkerError: If workers die, hang or fail. What the others were sent can be received
-                after `restart`.
+            VectorWorkerError: If workers die, hang or fail. What the others were sent can be
+                received after `restart`.
         """
         self._expect_workers()
         if (sent := len(self._backend.pending.env_ids)) < self.batch_size:
@@ -276,7 +276,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Raises:
             TaskError: If a seed is not valid, or of an environment that is not gone.
-            WorkerError: If a worker ends before it is ready; another attempt is allowed.
+            VectorWorkerError: If a worker ends before it is ready; another attempt is allowed.
         """
         self._expect_open()
         gone = sorted(self._backend.failures)
@@ -298,7 +298,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
         Raises:
             TaskError: If it was not made with ``render_mode="rgb_array"``.
-            WorkerError: If workers die, hang or fail.
+            VectorWorkerError: If workers die, hang or fail.
         """
         if self.render_mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
@@ -322,7 +322,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         self._expect_workers()
         try:
             return self._backend.call(method, arguments)
-        except WorkerError as error:
+        except VectorWorkerError as error:
             error.results = results()
             raise
 

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from robot_layouts.core.processes.start import WorkerError as ProcessWorkerError
-from robot_layouts.core.processes.start import enough, preload
+from robot_layouts.core.processes.start import WorkerError, enough, preload
 from robot_layouts.core.processes.transport import RemoteError, WorkerTraceback, packed
 from robot_layouts.core.processes.worker import (
     MAKE,
@@ -22,7 +21,7 @@ from robot_layouts.core.processes.worker import (
 from tasks.interfaces.batch import (
     Arrays,
     Batch,
-    Part,
+    BatchPart,
     Shapes,
     lay_out,
     map_memory,
@@ -52,7 +51,7 @@ class Failure:
     traceback: str = ""
 
 
-class WorkerError(ProcessWorkerError):
+class VectorWorkerError(WorkerError):
     """Workers of a vector that died, hung or failed; the others have done what they were asked.
 
     If tasks raised something in them, the ``__cause__`` says where.
@@ -166,7 +165,7 @@ def partition(num_envs: int, num_workers: int, batch_size: int) -> list[list[ran
     ]
 
 
-def batch_arguments(part: Part, env_ids: Sequence[int]) -> tuple[list[int], ...]:
+def batch_arguments(part: BatchPart, env_ids: Sequence[int]) -> tuple[list[int], ...]:
     """Return what `Batch.step` is called with to step some environments of a part."""
     return () if len(env_ids) == len(part.env_ids) else ([i - part.start for i in env_ids],)
 
@@ -177,7 +176,7 @@ class InProcess:
     What fails is raised as it is.
     """
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(self, parts: Sequence[BatchPart]) -> None:
         """Make the batches.
 
         Raises:
@@ -231,7 +230,7 @@ class Workers:
     """
 
     def __init__(
-        self, by_worker: Sequence[Sequence[Part]], timeout: float | None, seeds: Sequence[int]
+        self, by_worker: Sequence[Sequence[BatchPart]], timeout: float | None, seeds: Sequence[int]
     ) -> None:
         """Start the processes and wait until their worlds are built.
 
@@ -241,7 +240,7 @@ class Workers:
             seeds: The last seed of every environment, which errors name.
 
         Raises:
-            WorkerError: If a worker ends before it is ready.
+            VectorWorkerError: If a worker ends before it is ready.
             RobotLayoutsError: What a worker could not make its task for, or what ran out.
         """
         self.parts = [part for own in by_worker for part in own]
@@ -273,7 +272,7 @@ class Workers:
         """Start workers, in the place of those that are gone.
 
         Raises:
-            WorkerError: If one ends before it is ready.
+            VectorWorkerError: If one ends before it is ready.
             RobotLayoutsError: What a worker could not make its task for, or what ran out.
         """
         try:
@@ -301,7 +300,7 @@ class Workers:
             arguments: Number of a part → what it calls the method with.
 
         Raises:
-            WorkerError: If workers die, hang or fail; the others have done it.
+            VectorWorkerError: If workers die, hang or fail; the others have done it.
         """
         requests = {i: self._request(i, method, own) for i, own in arguments.items()}
         return self._results(requests, self.timeout)
@@ -322,7 +321,7 @@ class Workers:
         Those that were sent first come first. The others stay, until they are taken.
 
         Raises:
-            WorkerError: If workers die, hang or fail before.
+            VectorWorkerError: If workers die, hang or fail before.
         """
         if self._interrupted:  # a reply says that all that was asked for before is done, too
             asked = [self._ask(i, None, "wait", ()) for i, open_ in self._open.items() if open_]
@@ -380,7 +379,7 @@ class Workers:
         """Read replies until a condition holds, or no worker is left that could change it.
 
         Raises:
-            WorkerError: If workers died, hung or failed meanwhile.
+            VectorWorkerError: If workers died, hung or failed meanwhile.
             RobotLayoutsError: What a worker could not make its task for.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
@@ -398,10 +397,10 @@ class Workers:
         if failures:
             raise self.error(sorted(failures, key=lambda failure: failure.worker))
 
-    def error(self, failures: Sequence[Failure]) -> WorkerError:
+    def error(self, failures: Sequence[Failure]) -> VectorWorkerError:
         """Return what to raise for workers that are gone."""
-        hint = "restart() replaces what is gone; the other environments are untouched"
-        return WorkerError(failures, self._seeds, hint if self._made else "no vector was made")
+        way = "restart() replaces what is gone; the other environments are untouched"
+        return VectorWorkerError(failures, self._seeds, way if self._made else "no vector was made")
 
     def _handle(self, number: int, reply: Reply) -> Failure | None:
         """Note what a worker replied; returns a failure if it can go on no more.
@@ -452,7 +451,7 @@ class Workers:
 class _Batches:
     """Makes the parts that a worker holds, and calls them."""
 
-    def __init__(self, parts: Sequence[Part]) -> None:
+    def __init__(self, parts: Sequence[BatchPart]) -> None:
         self._parts = tuple(parts)
 
     def __call__(self) -> Callable[..., Any]:

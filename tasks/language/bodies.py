@@ -4,19 +4,28 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import cos, isfinite, sin
-from typing import ClassVar, Literal, TypeAlias, TypedDict
+from typing import Any, ClassVar, Literal, TypeAlias, TypedDict, TypeVar
 
 from layouts import Layout
 from robot_layouts.core.schema import check_fields
 from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_table
-from robot_layouts.simulation.scene.shapes import Color, Coordinate, Density, Length, Lengths, Place
+from robot_layouts.simulation.scene.shapes import (
+    Color,
+    Coordinate,
+    Density,
+    Length,
+    Lengths,
+    Place,
+    scaled,
+)
 from robot_layouts.simulation.tabletop import TABLE_OUTLINE
 from robot_layouts.simulation.world import BodyKind
 from robots import TaskError
 from robots.descriptor import IDENTITY, Quaternion
+from tasks.language.fitting import AS_DECLARED, Fit
 from tasks.language.props import (
     FACE_UP,
     GREEN,
@@ -29,6 +38,7 @@ from tasks.language.props import (
 )
 from tasks.language.randomness import EpisodeRandom
 
+_Body = TypeVar("_Body", bound="Body")
 Rectangle = tuple[float, float, float, float]
 Range: TypeAlias = "float | tuple[float, float]"
 """A number, or the smallest and the largest that may be drawn."""
@@ -43,12 +53,14 @@ class Area:
         y: Of its origin (m, world).
         z: Of its origin (m, world); None lays the body on the table.
         yaw: How it is turned about z (rad), or ``"any"`` angle.
+        fit: Where the frame of these numbers lies in the world, and how large it is there.
     """
 
     x: Range = 0.0
     y: Range = 0.0
     z: Range | None = None
     yaw: Range | Literal["any"] = 0.0
+    fit: Fit = field(default=AS_DECLARED, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse what is no range.
@@ -82,7 +94,12 @@ class Area:
             lows, highs = zip(*varying, strict=True)
             drawn = iter(rng.uniform_between(lows, highs).tolist())
             sides = [next(drawn) if isinstance(side, tuple) else side for side in sides]
-        return [float(side) for side in sides if not isinstance(side, tuple)], self._turn(rng)
+        place = [float(side) for side in sides if not isinstance(side, tuple)]
+        turn = self._turn(rng)
+        if self.fit.as_declared:
+            return place, turn
+        x, y, z = self.fit.place((place[0], place[1], place[2]))
+        return [x, y, height if self.z is None else z], self.fit.turned(turn)
 
     def _turn(self, rng: EpisodeRandom) -> Quaternion:
         if self.yaw == "any":
@@ -121,6 +138,9 @@ class Body(ABC):
     marker: ClassVar[bool] = False
     """Whether it is there for people only: cameras that observe do not see it."""
 
+    sizes: ClassVar[tuple[str, ...]] = ()
+    """Names of the fields that are lengths, or shapes."""
+
     def __post_init__(self) -> None:
         """Refuse what no body can be.
 
@@ -143,6 +163,19 @@ class Body(ABC):
     def lying(self) -> Quaternion:
         """How it is turned when it lies on the table, wxyz, before any yaw."""
         return IDENTITY
+
+    def fitted(self: _Body, fit: Fit) -> _Body:
+        """Return it as large, and beginning where, a fit says."""
+        changed: dict[str, Any] = {
+            name: _resized(value, fit.scale)
+            for name in self.sizes
+            if (value := getattr(self, name)) is not None
+        }
+        if self.spawn is not None:
+            changed["spawn"] = replace(self.spawn, fit=fit)
+        if self.start is not None:
+            changed["start"] = fit.place(self.start)
+        return replace(self, **changed)
 
     def add_to(self, world: World, name: str) -> None:
         """Build it in a world."""
@@ -190,6 +223,7 @@ class Cuboid(Solid):
 
     half_size: Lengths
     color: Color = RED
+    sizes: ClassVar[tuple[str, ...]] = ("half_size",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -213,6 +247,7 @@ class Cube(Solid):
 
     half_size: Length
     color: Color = RED
+    sizes: ClassVar[tuple[str, ...]] = ("half_size",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -237,6 +272,7 @@ class Ball(Solid):
 
     radius: Length
     color: Color = RED
+    sizes: ClassVar[tuple[str, ...]] = ("radius",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -264,6 +300,7 @@ class Peg(Body):
     half_width: Length
     tail: Color = GREEN
     head: Color = RED
+    sizes: ClassVar[tuple[str, ...]] = ("half_length", "half_width")
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -287,6 +324,7 @@ class Compound(Body):
 
     parts: tuple[Shape, ...]
     rest_height: Coordinate = 0.0
+    sizes: ClassVar[tuple[str, ...]] = ("parts", "rest_height")
 
     def __post_init__(self) -> None:
         """Refuse what no body can be.
@@ -320,6 +358,7 @@ class Goal(Body):
     radius: Length
     kind: BodyKind = field(default="kinematic", kw_only=True)
     marker: ClassVar[bool] = True
+    sizes: ClassVar[tuple[str, ...]] = ("radius",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -338,6 +377,7 @@ class Target(Body):
     radius: Length
     kind: BodyKind = field(default="kinematic", kw_only=True)
     start: Place | None = field(default=(0.0, 0.0, 0.0), kw_only=True)
+    sizes: ClassVar[tuple[str, ...]] = ("radius",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -402,6 +442,13 @@ class WideTable:
 
 
 Declared: TypeAlias = Body | Table | WideTable
+
+
+def _resized(value: Any, scale: float) -> Any:
+    """Return a length, several, or shapes, larger by a factor."""
+    if isinstance(value, tuple):
+        return tuple(_resized(part, scale) for part in value)
+    return scaled(value, scale) if isinstance(value, Shape) else value * scale
 
 
 def _turned(lying: Quaternion, turn: Quaternion) -> Quaternion:

@@ -26,7 +26,7 @@ class Needs:
         tcp_is_link: Whether its TCP must be a link, not a point between several.
 
     Raises:
-        TaskError: If a number or a flag makes no sense.
+        TaskError: If a number or a flag is invalid.
     """
 
     fingers: bool = False
@@ -35,7 +35,7 @@ class Needs:
     tcp_is_link: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what nobody can have."""
+        """Refuse what no arm can have."""
         for name in ("fingers", "tcp_is_link"):
             checked_flag(name, getattr(self, name), TaskError)
         for name in ("opening", "reach"):

@@ -17,7 +17,7 @@ from tasks.randomization.distributions import Stream
 
 
 class FirstSeeds:
-    """Seeds for the first episodes of environments that nobody gives a seed.
+    """Seeds for the first episodes of environments that are not given a seed.
 
     They are drawn from the system's entropy, so that no two environments play the same episodes
     unless someone wants that.
@@ -101,7 +101,7 @@ class EpisodeRandom:
         """Draw float32 numbers in [0, 1) from the torch stream.
 
         Raises:
-            TaskError: If a length is none.
+            TaskError: If a length is not a whole number of at least 0.
         """
         try:
             return torch.rand(shape, generator=self.torch)

@@ -234,7 +234,7 @@ def write_state_dict(
         env_ids: Which worlds.
 
     Raises:
-        TaskError: If a key is unknown, a row has the wrong length, or a number makes no sense; says
+        TaskError: If a key is unknown, a row has the wrong length, or a number is invalid; says
             in which entry and environment. Nothing is changed then.
     """
     rows = _checked_rows(simulation, state, env_ids)

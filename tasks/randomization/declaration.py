@@ -44,7 +44,7 @@ class Axis:
         """Return what was declared for an axis, checked: one thing, or by name.
 
         Raises:
-            TaskError: If it makes no sense.
+            TaskError: If it is invalid.
         """
         if not self.named:
             return None if data is None else self.takes.read(data, what)
@@ -153,7 +153,7 @@ class Randomization:
     observation_delay: Distribution | None = _axis(_STEPS, named=False)
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense.
+        """Refuse invalid declarations.
 
         Raises:
             TaskError: If something is no distribution, or may draw what cannot be.
@@ -188,7 +188,7 @@ class Randomization:
             data: By axis, such as ``{"mass": {"cube": {"uniform": [0.5, 2.0]}}}``.
 
         Raises:
-            TaskError: If it makes no sense.
+            TaskError: If it is invalid.
             UnknownNameError: If there is no such axis.
         """
         if not isinstance(data, Mapping):

@@ -20,7 +20,7 @@ from robot_layouts.simulation.scene.looks import Paint
 from robot_layouts.simulation.scene.parts import Part
 from robot_layouts.simulation.scene.shapes import Capsule
 from robot_layouts.simulation.scene.variation import Variation
-from robot_layouts.simulation.world import Body, BodyKind
+from robot_layouts.simulation.world import BodyKind, WorldBody
 from robots import TaskError
 from robots.descriptor import Vector3
 from tasks.randomization.distributions import Distribution, Stream, Uniform, as_whole
@@ -109,7 +109,7 @@ class Distractors(Group):
         """Refuse what cannot be drawn.
 
         Raises:
-            TaskError: If a field is not what it must be, or may draw what makes no sense.
+            TaskError: If a field is not what it must be, or may draw invalid values.
             UnknownNameError: If there is no such shape.
         """
         super().__post_init__()
@@ -286,7 +286,7 @@ def _taken(simulation: Simulation, state: State, env: int, without: set[str]) ->
     return found[found[:, 1, 2] > _GROUND]
 
 
-def _around(body: Body, pose: Floats) -> list[Floats]:
+def _around(body: WorldBody, pose: Floats) -> list[Floats]:
     """Return a box around a body that touches nothing: a goal, say."""
     reach = [hypot(*shape.position) + length for shape in body.shapes if (length := _length(shape))]
     return [np.array([pose[:3] - max(reach), pose[:3] + max(reach)])] if reach else []

@@ -188,7 +188,7 @@ class Whole(_Range):
         """Refuse bounds that are no whole numbers.
 
         Raises:
-            TaskError: If they are none, or the wrong way round.
+            TaskError: If they are no whole numbers, or the wrong way round.
         """
         for bound in ("low", "high"):
             value = as_whole(getattr(self, bound))

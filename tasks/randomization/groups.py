@@ -42,7 +42,7 @@ class Limits:
         """Return the distribution that was given, if all that it may draw is within.
 
         Raises:
-            TaskError: If it is none, or may draw what makes no sense.
+            TaskError: If it is not a distribution, or may draw invalid values.
         """
         drawn = read_distribution(data, what)
         if self.whole and isinstance(drawn, Fixed) and drawn.number.is_integer():
@@ -90,7 +90,7 @@ class Group:
         """Refuse what cannot be drawn.
 
         Raises:
-            TaskError: If a field is no distribution, or may draw what makes no sense.
+            TaskError: If a field is not a distribution, or may draw invalid values.
         """
         for name in self.needed():
             if getattr(self, name) is None:
@@ -110,7 +110,7 @@ class Group:
         """Return the group that was given, or that plain data describes.
 
         Raises:
-            TaskError: If it is none, or lacks a number that it needs.
+            TaskError: If it is not such a group, or lacks a number that it needs.
             UnknownNameError: If it has no such field.
         """
         if isinstance(data, cls):

@@ -8,11 +8,11 @@ from typing import Annotated, Any, TypeAlias
 
 from robot_layouts.simulation.scene.looks import (
     PATTERNS,
+    CameraOffset,
     Glow,
     Looks,
     Paint,
     Pattern,
-    Shift,
 )
 from robot_layouts.simulation.scene.parts import Part
 from robots.descriptor import Vector3
@@ -123,8 +123,8 @@ class Texture(Group):
         """Refuse what cannot be drawn.
 
         Raises:
-            TaskError: If there is nothing to choose from, a field is no distribution, or may draw
-                what makes no sense.
+            TaskError: If there is nothing to choose from, a field is not a distribution, or may
+                draw invalid values.
             UnknownNameError: If there is no such pattern.
         """
         super().__post_init__()
@@ -172,10 +172,10 @@ def looks(
     )
 
 
-def _shift(drawn: Mapping[str, float]) -> Shift:
+def _shift(drawn: Mapping[str, float]) -> CameraOffset:
     moved = _vector(drawn, ("x", "y", "z"), 0.0)
     turned = _vector(drawn, ("roll", "pitch", "yaw"), 0.0)
-    return Shift(moved, turned, drawn.get("fov", 1.0))
+    return CameraOffset(moved, turned, drawn.get("fov", 1.0))
 
 
 def _glow(drawn: Mapping[str, float]) -> Glow:

@@ -16,7 +16,7 @@ from robot_layouts.simulation.maths import Array, Floats
 from robots import UnknownNameError
 from tasks.arrays import row_of
 from tasks.randomization.distributions import Distribution, Stream
-from tasks.randomization.targets import Target, matching
+from tasks.randomization.targets import RandomizedThings, matching
 
 Noisy = Callable[[str, Array], Array]
 """Returns a named part of an observation, (N, k) or (N,), with its noise."""
@@ -48,7 +48,7 @@ def noise(
 class ActionNoise:
     """What is added to the numbers of actions."""
 
-    def __init__(self, targets: Mapping[str, Target]) -> None:
+    def __init__(self, targets: Mapping[str, RandomizedThings]) -> None:
         """Take what is drawn for which numbers, by name; of the same number the last one counts."""
         owners = {number: name for name, target in targets.items() for number in target.means}
         self._parts = {

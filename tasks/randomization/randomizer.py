@@ -174,7 +174,7 @@ class Randomizer:
             elapsed: Control steps that each environment has taken, (N,).
 
         Raises:
-            UnknownNameError: If noise was declared for a part that there is not.
+            UnknownNameError: If noise was declared for a part that does not exist.
             TaskError: If what is observed has no parts.
         """
         if "sensor_noise" not in self._declared:
@@ -231,7 +231,7 @@ def _value(takes: Any, stream: Stream, *names: str) -> Any:
 
 
 def _of_strength(gravity: Vector3, strength: float) -> Vector3:
-    """Return a vector in the direction of another, or downwards if that is none (m/s²)."""
+    """Return a vector in the direction of another, or downwards if that is zero (m/s²)."""
     length = float(np.linalg.norm(gravity))
     x, y, z = gravity if length else (0.0, 0.0, -1.0)
     share = strength / (length or 1.0)

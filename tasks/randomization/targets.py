@@ -12,13 +12,13 @@ from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, camer
 from robot_layouts.simulation.scene.looks import LIGHTS
 from robot_layouts.simulation.scene.parts import Part
 from robot_layouts.simulation.scene.shapes import SIZED
-from robot_layouts.simulation.world import Body
+from robot_layouts.simulation.world import WorldBody
 from robots import UnknownNameError
 
 Thing = TypeVar("Thing")
 
 
-class Target(NamedTuple):
+class RandomizedThings(NamedTuple):
     """What is drawn for a thing, or for several alike.
 
     Attributes:
@@ -32,7 +32,7 @@ class Target(NamedTuple):
 
 def targets(
     axis: str, declared: Mapping[str, Any], offered: Mapping[str, tuple[Thing, ...]]
-) -> dict[str, Target]:
+) -> dict[str, RandomizedThings]:
     """Return what is meant by each name of an axis, the more important ones last.
 
     Args:
@@ -43,14 +43,14 @@ def targets(
     Raises:
         UnknownNameError: If a name means nothing.
     """
-    found: dict[str, Target] = {}
+    found: dict[str, RandomizedThings] = {}
     for pattern, takes in declared.items():
         names = matching(pattern, offered)
         if not names:
             raise UnknownNameError(f"target of {axis}", pattern, offered)
         for name in names:
             found.pop(name, None)
-            found[name] = Target(takes, offered[name])
+            found[name] = RandomizedThings(takes, offered[name])
     return found
 
 
@@ -93,9 +93,9 @@ def _by_name(names: Iterable[str]) -> dict[str, tuple[str, ...]]:
     return {name: (name,) for name in names}
 
 
-def _parts(simulation: Simulation, takes: Callable[[Body], bool]) -> dict[str, tuple[Part, ...]]:
+def _parts(simulation: Simulation, fit: Callable[[WorldBody], bool]) -> dict[str, tuple[Part, ...]]:
     """Return some bodies, the links of each robot, and each of these by itself."""
-    bodies = [body.name for body in simulation.worlds[0].bodies.values() if takes(body)]
+    bodies = [body.name for body in simulation.worlds[0].bodies.values() if fit(body)]
     links = {
         robot: tuple(Part(robot, link) for link in simulation.index.robots[robot].links)
         for robot in simulation.layout

@@ -7,16 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import tasks
 from benchmarks.__main__ import main
-from benchmarks.bench.environments import Played
+from benchmarks.bench.environments import Played, Worked
 from benchmarks.bench.measurement import BenchmarkError, Clock, Measurement, Settings
 from benchmarks.bench.plot import draw
 from benchmarks.bench.report import RECORD, Report, machine, read_report, summary
 from benchmarks.bench.run import BENCHMARKS, BESIDE_NATIVE
 from benchmarks.bench.worlds import make_pile
 from parity.native import make_native, native_action
+from robot_layouts.experts import find_expert, register_expert
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from tests.native import NATIVE
 from tests.quick import quick_cases
@@ -95,6 +97,28 @@ class TestWhatIsTimed:
         played.step(4)
         assert not np.array_equal(played.env.simulation.read().joint_positions, ends[0])
 
+    def test_an_experts_episode_succeeds_in_every_round_and_its_physics_is_the_same(self):
+        worked = Worked(tasks.make("PickCube-v1"), TINY)
+        simulation = worked.env.simulation
+        ends: list[NDArray[np.float32]] = []
+        for play in (worked.step, worked.physics, worked.step):
+            assert play(len(ends)) > 0
+            state = simulation.read()
+            assert worked.env.task.evaluate(state)["success"].all()
+            ends.append(state.joint_positions.copy())
+        assert np.array_equal(ends[0], ends[1])
+        assert np.array_equal(ends[0], ends[2])
+
+    def test_a_task_that_its_expert_never_solves_is_not_measured(self):
+        task_id = "TwoRobotPickCube-v1"
+        expert = find_expert(task_id)
+        register_expert(task_id, lambda task, seed: np.zeros((1, 16), np.float32))
+        try:
+            with pytest.raises(BenchmarkError, match="solves none of the seeds"):
+                Worked(tasks.make(task_id), TINY)
+        finally:
+            register_expert(task_id, expert)
+
     @pytest.mark.parametrize(("cubes", "pairs"), [(0, 1), (8, 25), (64, 400)])
     def test_cubes_of_a_pile_touch_and_stay_awake(self, cubes, pairs):
         env = make_pile(cubes)
@@ -145,7 +169,13 @@ class TestBesideNative:
     def test_native_is_measured(self, name):
         both = ("PickCube-v1", "FourRobotStack-v1")
         found = BESIDE_NATIVE[name](replace(TINY, rounds=1, vector_task=both))
-        assert found.median("native", "PickCube-v1") > 0
+        assert all(
+            found.median(series, "PickCube-v1") > 0
+            for series in found.samples
+            if series.startswith("native")
+        )
+        if name == "step":
+            assert [*found.samples][:2] == ["here, expert's actions", "native, expert's actions"]
         if name == "vector":
             assert found.median("native", "FourRobotStack-v1") is None
 

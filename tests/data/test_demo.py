@@ -119,7 +119,7 @@ def test_without_visual_meshes_one_line_says_so(tmp_path, monkeypatch, console):
     monkeypatch.setattr(UrdfLocator, "locate", no_pictures)
     assert run_demo(DemoOptions(seeds=1, out=tmp_path), console)
     printed = console.export_text()
-    assert "no video: the robots' visual meshes cannot be had: 11 robot files cannot be" in printed
+    assert "no video: the robots' visual meshes are missing: 11 robot files cannot be" in printed
     assert "sources tried" not in printed
 
 

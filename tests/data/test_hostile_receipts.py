@@ -58,7 +58,10 @@ def _set(*path):
         (_set("making", "physics", [1]), "making.physics is .*; it must be an object or None"),
         (_set("making", "num_envs", 10**6), "the receipt's task cannot be made here: num_envs is"),
         (_set("making", "obs_mode", "smell"), "the receipt's task cannot be made here: "),
-        (_set("making", "layout", "arm", "robot", "pandy"), "a robot at 'arm' that cannot be had"),
+        (
+            _set("making", "layout", "arm", "robot", "pandy"),
+            "a robot at 'arm' that is not",
+        ),
         (_set("making", "layout", {}), "the receipt's task cannot be made here: "),
         (_set("making", "layout", "arm", "position", [1, 2]), "a list of 3 values"),
         (_set("making", "cameras", [{"eye": 1}]), "the receipt's task cannot be made here: "),

@@ -228,7 +228,7 @@ def test_another_recording_is_not_gone_on_with(tmp_path, capsys):
         (["--ray=auto", "--workers=0"], 1, "workers on a Ray cluster is 0; it must be an integer"),
         (["--seed=-1"], 2, "-1 is too few; it must be 0 or more"),
         (["--control-mode=pd_ee_dance"], 1, "control_mode 'pd_ee_dance' is not offered"),
-        (["--control-mode=left=,right="], 2, "makes no sense; a name such as"),
+        (["--control-mode=left=,right="], 2, "is invalid; a name such as"),
     ],
 )
 def test_bad_usage(tmp_path, capsys, words, code, complaint):

@@ -2,7 +2,7 @@
 
 import threading
 from contextlib import contextmanager, suppress
-from time import monotonic, thread_time
+from time import monotonic
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
@@ -26,7 +26,6 @@ LEFT, RIGHT = "/(gizmos)/left", "/(gizmos)/right"
 class Site:
     def __init__(self, page, session, server, address):
         self.page, self.session, self.server, self.address = page, session, server, address
-        self.worked = 0.0  # s of the processor
         self.port = urlsplit(address).port
         self.token = parse_qs(urlsplit(address).query)["token"][0]
 
@@ -41,7 +40,6 @@ def site(session):
         def go_on():
             while not ended.is_set():
                 page.tick()
-                running.worked = thread_time()
 
         thread = threading.Thread(target=go_on)
         thread.start()
@@ -259,7 +257,7 @@ def test_a_minute_of_steering_loses_no_step(tmp_path):
             guest.send({"type": "TransformControlsDragStartMessage", "name": name, "owner": ""})
         press(one, "Start (P)")
         wait_until(lambda: session.actions)
-        start, first, worked = monotonic(), len(session.actions), cell.worked
+        start, first = monotonic(), len(session.actions)
         while (now := monotonic() - start) < 60:
             way = 0.04 * np.sin([now, 2 * now, 3 * now])
             one.send(moved(LEFT, began["left"] + [*way, 0, 0, 0, 0]))
@@ -268,7 +266,6 @@ def test_a_minute_of_steering_loses_no_step(tmp_path):
         steps, pace = len(session.actions) - first, cell.page.pace
         # Busy machines let time stand still; otherwise a second late is caught up later.
         assert abs(steps * session.seconds + pace.lost - 60) <= 2 * MOST_BEHIND
-        assert (cell.worked - worked) / steps < session.seconds / 2  # idle ones need not
         press(one, "Keep (M)")
         wait_until(lambda: session.kept)
     with Recording(tmp_path / FILE) as file:

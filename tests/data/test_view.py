@@ -9,9 +9,9 @@ import pytest
 import robot_layouts as rl
 from benchmarks.teleop import served
 from robot_layouts.__main__ import main
-from robot_layouts.data.commands import episode_cell
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.view import episode_cell
 from tests.data.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record
 from tests.pages import browser_page, changed, settled
 

@@ -16,9 +16,9 @@ from robot_layouts.experts import (
     pick,
     rehearse,
 )
-from robot_layouts.experts.tips import gripper_turn
 from robot_layouts.kinematics.rotations import rotate
 from robots import ActionError, RobotRegistry
+from robots.gripper_motion import gripper_turn
 
 
 def test_every_name_is_explained():

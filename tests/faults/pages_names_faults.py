@@ -99,10 +99,10 @@ def _saved_name(folder: Path, name: str) -> str:
 
 def _robot(folder: Path, name: str) -> str:
     from layouts import single
-    from layouts.viewer import Cell
+    from layouts.viewer import ShownCell
     from tests.layouts.guests import named_robot, site
 
-    with site(Cell("cell", single({name: named_robot(folder)}))) as running:
+    with site(ShownCell("cell", single({name: named_robot(folder)}))) as running:
         nodes = running.server.scene._handle_from_node_name
         assert type(nodes["/(floor)"]).__name__ == "GridHandle"
         assert {f"/{name}/collision/{link}" for link in ("base", "upper", "lower")} <= set(nodes)

@@ -19,12 +19,12 @@ def cell() -> Any:
     """Return a cell with a robot called ``arm`` and a motion."""
     import numpy as np
 
-    from layouts.viewer import Cell, Motion
+    from layouts.viewer import ShownCell, ShownMotion
     from tests.layouts.guests import small_cell
 
     bare = small_cell(Path(_UNTIL_THE_END.enter_context(TemporaryDirectory())))
     start = np.tile(bare.start["arm"], (3, 1))
-    return Cell("cell", bare.layout, motion=Motion(0.05, {"arm": start}))
+    return ShownCell("cell", bare.layout, motion=ShownMotion(0.05, {"arm": start}))
 
 
 @cache

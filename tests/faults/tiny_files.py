@@ -1,4 +1,4 @@
-"""Three small robot files, and where they can be had: for faults of fetching."""
+"""Three small robot files, and where they are found: for faults of fetching."""
 
 from __future__ import annotations
 

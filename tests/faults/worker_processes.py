@@ -30,12 +30,12 @@ USES: dict[str, Callable[[Any], Any]] = {
 
 
 def failure(call: Callable[[], Any]) -> Any:
-    """Return the `WorkerError` that a call ends with."""
-    from tasks.interfaces.workers import WorkerError
+    """Return the `VectorWorkerError` that a call ends with."""
+    from tasks.interfaces.workers import VectorWorkerError
 
     try:
         call()
-    except WorkerError as error:
+    except VectorWorkerError as error:
         return error
     raise AssertionError("nothing failed")
 

@@ -6,7 +6,7 @@ import pytest
 from robot_layouts.kinematics.rotations import rotation_about, rotation_vector
 from robot_layouts.kinematics.solve import (
     NEAR_ENOUGH,
-    Goal,
+    IkGoal,
     approach,
     by_way,
     descend_by_differences,
@@ -42,7 +42,7 @@ def test_a_pose_that_the_arm_can_have_is_reached(robot, turned):
     tip = tree.link(RobotRegistry.load(robot).tcp_link)
     wanted = starts_of(robot, 30)[29:]
     pose = tree.forward(wanted)[0, tip]
-    goal = Goal(pose[:3, 3], [tip], pose[:3, :3] if turned else None, tip)
+    goal = IkGoal(pose[:3, 3], [tip], pose[:3, :3] if turned else None, tip)
     found = solve(tree, goal, starts_of(robot), free)
     best = found.ranked(wanted[0])[0]
     assert found.solved[best]
@@ -62,7 +62,7 @@ def test_each_start_may_have_a_goal_of_its_own():
     poses = tree.forward(starts_of("panda", 8)[4:])[:, tip]
     starts = np.repeat(starts_of("panda", 4), 4, axis=0)  # four for each of four goals
     goals = np.tile(poses, (4, 1, 1))
-    found = solve(tree, Goal(goals[:, :3, 3], [tip], goals[:, :3, :3], tip), starts, free)
+    found = solve(tree, IkGoal(goals[:, :3, 3], [tip], goals[:, :3, :3], tip), starts, free)
     assert found.solved.reshape(4, 4).any(axis=0).all()
     reached = tree.forward(found.qpos)[:, tip]
     missing = np.linalg.norm(reached[:, :3, 3] - goals[:, :3, 3], axis=1)
@@ -73,7 +73,7 @@ def test_few_iterations_do_not_get_there():
     tree, free = tree_of("panda"), arm_of("panda")
     tip = tree.link(RobotRegistry.load("panda").tcp_link)
     far = starts_of("panda", 30)[29:]
-    goal = Goal(tree.forward(far)[0, tip, :3, 3], [tip])
+    goal = IkGoal(tree.forward(far)[0, tip, :3, 3], [tip])
     assert not solve(tree, goal, starts_of("panda", 1), free, iterations=1).solved.any()
     assert solve(tree, goal, starts_of("panda", 1), free).solved.any()
 
@@ -83,7 +83,7 @@ def test_the_mean_of_links_is_brought_to_a_place():
     links = [tree.link(n) for n in RobotRegistry.load("so100").tcp_position_links]
     assert len(links) == 2
     place = tree.forward(starts_of("so100", 30)[29:])[0, links, :3, 3].mean(0)
-    found = solve(tree, Goal(place, links), starts_of("so100"), free)
+    found = solve(tree, IkGoal(place, links), starts_of("so100"), free)
     best = int(np.argmin(found.missing))
     reached = tree.forward(found.qpos[best][None])[0, links, :3, 3].mean(0)
     assert np.linalg.norm(reached - place) == pytest.approx(found.missing[best], abs=1e-12)
@@ -92,7 +92,7 @@ def test_the_mean_of_links_is_brought_to_a_place():
 
 def test_what_is_out_of_reach_leaves_the_nearest_posture():
     tree, free = tree_of("panda"), arm_of("panda")
-    goal = Goal(np.array([5.0, 0.0, 0.3]), [tree.link("panda_hand_tcp")])
+    goal = IkGoal(np.array([5.0, 0.0, 0.3]), [tree.link("panda_hand_tcp")])
     found = solve(tree, goal, starts_of("panda"), free)
     assert not found.solved.any()
     (best,) = found.ranked(starts_of("panda")[0])
@@ -103,7 +103,7 @@ def test_what_is_out_of_reach_leaves_the_nearest_posture():
 def test_the_solution_with_the_shortest_way_comes_first():
     tree, free = tree_of("panda"), arm_of("panda")
     tip, rest = tree.link("panda_hand_tcp"), np.array(RobotRegistry.load("panda").keyframe("rest"))
-    goal = Goal(tree.forward(rest[None])[0, tip, :3, 3], [tip])
+    goal = IkGoal(tree.forward(rest[None])[0, tip, :3, 3], [tip])
     found = solve(tree, goal, np.concatenate([starts_of("panda"), rest[None]]), free)
     ways = [np.abs(found.qpos[i] - rest).max() for i in found.ranked(rest)]
     assert len(ways) > 5
@@ -113,7 +113,7 @@ def test_the_solution_with_the_shortest_way_comes_first():
 
 def test_the_same_request_has_the_same_answer():
     tree, free = tree_of("panda"), arm_of("panda")
-    goal = Goal(np.array([0.4, 0.1, 0.4]), [tree.link("panda_hand_tcp")])
+    goal = IkGoal(np.array([0.4, 0.1, 0.4]), [tree.link("panda_hand_tcp")])
     one, other = (solve(tree, goal, starts_of("panda"), free) for _ in range(2))
     np.testing.assert_array_equal(one.qpos, other.qpos)
     np.testing.assert_array_equal(scattered(tree.limits, 5), scattered(tree.limits, 5))
@@ -174,7 +174,7 @@ def test_an_arm_approaches_the_place_first_and_goes_no_farther_than_it_may(robot
     rest = qpos[free]
     pose = tree.forward(qpos[None])[0, tip]
     turned = pose[:3, :3] @ rotation_about([1.0, 0.0, 0.0], np.array(0.4))
-    goal = Goal(pose[:3, 3] + [0.01, 0.02, 0.01], [tip], turned, tip)
+    goal = IkGoal(pose[:3, 3] + [0.01, 0.02, 0.01], [tip], turned, tip)
     for _ in range(40):
         before = qpos
         qpos = approach(tree, goal, qpos, free, 0.05, rest)

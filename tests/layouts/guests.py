@@ -15,7 +15,7 @@ import zstandard
 from websockets.sync.client import connect
 
 from layouts import single
-from layouts.viewer import Cell
+from layouts.viewer import ShownCell
 from layouts.viewer.page import CellPage
 from layouts.viewer.server import serving
 from robots import RobotDescriptor
@@ -69,16 +69,16 @@ class Site:
 
 
 @contextmanager
-def site(cell: Cell, host: str = "127.0.0.1") -> Iterator[Site]:
+def site(cell: ShownCell, host: str = "127.0.0.1") -> Iterator[Site]:
     with serving(host, 0, cell.title) as (server, address):
         page = CellPage(server, cell)
         page.tick(0.0)
         yield Site(page, server, address)
 
 
-def small_cell(folder: Path, title: str = "cell", **changes: Any) -> Cell:
+def small_cell(folder: Path, title: str = "cell", **changes: Any) -> ShownCell:
     """Return a cell of one small robot that touches itself, called ``arm``."""
-    return Cell(title, single({"arm": named_robot(folder, **changes)}))
+    return ShownCell(title, single({"arm": named_robot(folder, **changes)}))
 
 
 def named_robot(folder: Path, upper="upper", lower="lower", elbow="elbow") -> RobotDescriptor:

@@ -42,7 +42,7 @@ def some_of(names):
 
 
 mixed = some_of(RobotRegistry.names())
-# A hand at a table may begin inside it, which no distance mends.
+# A hand at a table may begin inside it, which no distance avoids.
 ARMS = [name for name in RobotRegistry.names() if RobotRegistry.load(name).reach > 0.3]
 mixed_arms = some_of(ARMS)
 PANDA = RobotRegistry.load("panda")

@@ -1,4 +1,4 @@
-"""Checks of layouts whose robots' files change, or make no sense."""
+"""Checks of layouts whose robots' files change, or are invalid."""
 
 import pytest
 
@@ -21,7 +21,7 @@ from tests.layouts.test_validation import TURN, kinds, pair
 
 
 class TestFiles:
-    """A robot whose files make no sense does not keep the others from being checked."""
+    """A robot whose files are invalid does not keep the others from being checked."""
 
     def layout(self, tmp_path, **others):
         text = urdf(link("base", '<mesh filename="gone.stl"/>'), link("top"), TURN)

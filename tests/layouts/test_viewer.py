@@ -12,7 +12,7 @@ import trimesh
 from benchmarks.teleop import served
 from layouts import side_by_side, single
 from layouts.__main__ import main
-from layouts.viewer import Cell, Motion, Thing, ViewerError
+from layouts.viewer import ShownCell, ShownMotion, Thing, ViewerError
 from layouts.viewer.cell import LinkContact
 from layouts.viewer.page import NO_SLIDERS, CellPage, contacts_text, save_html
 from layouts.viewer.server import serving
@@ -23,16 +23,16 @@ from tests.layouts.cells import link_poses, mixed_cell, random_positions
 ARM = ("single", "arm=so100")
 
 
-def make_cell(moments: int = 0) -> Cell:
+def make_cell(moments: int = 0) -> ShownCell:
     layout = single({"arm": "so100"})
     if not moments:
-        return Cell("arm", layout)
+        return ShownCell("arm", layout)
     start = np.array(layout["arm"].start_qpos)
     ball = Thing((coloured(trimesh.creation.icosphere(), (1, 0, 0, 1)),), np.eye(7)[3])
     poses = np.tile(np.eye(7)[3], (moments, 1))
     poses[:, 0] = np.arange(moments)
-    motion = Motion(0.05, {"arm": start + np.arange(moments)[:, None] * 0.01}, {"ball": poses})
-    return Cell("arm", layout, {"ball": ball}, motion)
+    motion = ShownMotion(0.05, {"arm": start + np.arange(moments)[:, None] * 0.01}, {"ball": poses})
+    return ShownCell("arm", layout, {"ball": ball}, motion)
 
 
 @pytest.mark.long
@@ -86,7 +86,7 @@ def test_a_port_in_use_is_refused_with_a_way_out(capsys):
     [
         (["--host", "nowhere.invalid"], "there is no address 'nowhere.invalid'"),
         (["--host", "192.0.2.1"], "cannot listen at '192.0.2.1', port 8080"),
-        (["--port", "70000"], "port 70000 is none; ports are 0 … 65535"),
+        (["--port", "70000"], "port 70000 does not exist; ports are 0 … 65535"),
         (["--html", "cell.pdf"], "cannot save a page as 'cell.pdf'; the name must end in .html"),
     ],
 )
@@ -103,7 +103,7 @@ def test_a_missing_package_is_told_with_the_command_that_installs_it(monkeypatch
 
 def test_links_stand_where_yourdfpy_puts_them():
     layout = mixed_cell()
-    cell, random = Cell("mixed", layout), np.random.default_rng(0)
+    cell, random = ShownCell("mixed", layout), np.random.default_rng(0)
     for name, placement in layout.items():
         positions = random_positions(placement, random)
         qpos = np.array([positions[joint] for joint in placement.robot.joints])
@@ -118,7 +118,7 @@ def test_links_stand_where_yourdfpy_puts_them():
 def test_the_page_shows_every_robot_and_overlay_at_the_posed_joints():
     layout = side_by_side({"a": "so100", "b": "so100"}, spacing=0.6)
     with serving("127.0.0.1", 0, "cell") as (server, _):
-        cell = Cell("cell", layout)
+        cell = ShownCell("cell", layout)
         page = CellPage(server, cell)
         page.tick(0.0)
         nodes = server.scene._handle_from_node_name
@@ -138,7 +138,7 @@ def test_the_page_shows_every_robot_and_overlay_at_the_posed_joints():
 
 def test_overlaps_are_named_and_marked():
     close = side_by_side({"a": "so100", "b": "so100"}, spacing=0.03)
-    cell = Cell("close", close)
+    cell = ShownCell("close", close)
     contacts = cell.contacts(cell.start)
     assert contacts
     assert {contact.robots for contact in contacts} == {("a", "b")}
@@ -185,19 +185,19 @@ def test_the_timeline_moves_robots_and_things():
     ("motion", "message"),
     [
         (
-            Motion(0.05, {"leg": np.zeros((2, 6))}),
+            ShownMotion(0.05, {"leg": np.zeros((2, 6))}),
             "the motion is of the robots leg; the layout has",
         ),
-        (Motion(0.05, {"arm": np.zeros((0, 6))}), "1 or more"),
+        (ShownMotion(0.05, {"arm": np.zeros((0, 6))}), "1 or more"),
         (
-            Motion(0.05, {"arm": np.zeros((2, 6))}, {"ball": np.zeros((2, 7))}),
+            ShownMotion(0.05, {"arm": np.zeros((2, 6))}, {"ball": np.zeros((2, 7))}),
             "the motion moves ball, which are not in the cell",
         ),
     ],
 )
 def test_motions_of_something_else_are_refused(motion, message):
     with pytest.raises(LayoutError, match=message):
-        Cell("arm", single({"arm": "so100"}), motion=motion)
+        ShownCell("arm", single({"arm": "so100"}), motion=motion)
 
 
 def test_a_saved_page_is_whole_or_not_there(tmp_path):
@@ -235,7 +235,7 @@ def test_no_mesh_is_drawn_of_more_triangles_than_other_programs_read():
 
 
 def test_a_robot_without_visual_meshes_is_shown_by_its_collision_shapes(capsys, tmp_path):
-    cell = Cell("pinch", single({"arm": "panda_pinch"}))
+    cell = ShownCell("pinch", single({"arm": "panda_pinch"}))
     assert len(cell.notes) == 1
     assert cell.notes[0].startswith("arm is shown by its collision shapes: ")
     with serving("127.0.0.1", 0, "pinch") as (server, _):

@@ -235,7 +235,7 @@ def test_a_viser_that_cannot_be_guarded_is_not_served(monkeypatch):
     )
     monkeypatch.setattr(viser_infra, "websockets", changed)
     with (
-        pytest.raises(ViewerError, match=r"viser .* would let in anybody who asks, so no page is"),
+        pytest.raises(ViewerError, match=r"viser .* would accept any client, so no page is"),
         serving("127.0.0.1", 0, "cell"),
     ):
         pytest.fail("it is served")
@@ -268,10 +268,10 @@ def test_a_link_with_a_slash_hangs_on_no_other_link(tmp_path):
 @pytest.mark.parametrize("name", ["floor", "things", "tables", "WorldAxes", "arm"])
 def test_a_robot_of_any_name_replaces_nothing_of_the_scene(name, tmp_path):
     from layouts import single
-    from layouts.viewer import Cell
+    from layouts.viewer import ShownCell
     from tests.layouts.guests import named_robot
 
-    with site(Cell("cell", single({name: named_robot(tmp_path)}))) as running:
+    with site(ShownCell("cell", single({name: named_robot(tmp_path)}))) as running:
         nodes = running.server.scene._handle_from_node_name
         assert type(nodes["/(floor)"]).__name__ == "GridHandle"
         assert nodes[f"/{name}"].visible

@@ -11,7 +11,7 @@ from robot_layouts.motion import NoPlanError, plan
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.model.obstacles import Track, box
-from robot_layouts.motion.planning.goals import Target
+from robot_layouts.motion.planning.goals import PlaceGoal
 from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs
 from robot_layouts.motion.planning.query import Query
 from robot_layouts.motion.timing.trajectories import CellTrajectory
@@ -107,7 +107,7 @@ def test_postures_that_are_cut_off_are_left_out():
 
 
 def asked(cell, candidates, others):
-    target = Target("arm", "arm", np.arange(6), candidates, "", lambda: others)
+    target = PlaceGoal("arm", "arm", np.arange(6), candidates, "", lambda: others)
     return Query(
         cell,
         cell.start,

@@ -321,7 +321,7 @@ def test_an_edge_is_as_free_as_its_states(crowd, resolution):
     assert 0 < np.mean(answers) < 1
 
 
-# -- what makes no sense ---------------------------------------------------------------------
+# -- invalid arguments -------------------------------------------------------------------------
 
 
 def test_wrong_arguments_are_refused_in_words(crowd):

@@ -10,7 +10,7 @@ from robot_layouts.motion import NoPlanError, TcpGoal, plan
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.model.obstacles import box
-from robot_layouts.motion.planning.goals import Target, read_targets
+from robot_layouts.motion.planning.goals import PlaceGoal, read_targets
 from robot_layouts.motion.planning.query import choices, find_goal_configurations
 from tests.motion.two_pandas import aside, cell, in_the_middle
 
@@ -28,7 +28,11 @@ def meeting(whole, *, others):
     start = np.concatenate(list(aside().values()))
     places = {"left": in_the_middle(), "right": in_the_middle()}
     left, right = read_targets(whole, places, start)
-    return left, Target("right", "right", right.moving, right.candidates, "", lambda: others), start
+    return (
+        left,
+        PlaceGoal("right", "right", right.moving, right.candidates, "", lambda: others),
+        start,
+    )
 
 
 def test_postures_of_a_longer_search_let_goals_agree():

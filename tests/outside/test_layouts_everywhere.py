@@ -90,7 +90,7 @@ class TestRecordings:
             layout = json.loads(file.attrs["layout"])
             layout["arm"]["robot"] = "pandda"
             file.attrs["layout"] = json.dumps(layout)
-        with pytest.raises(TrajectoryError, match="a robot at 'arm' that cannot be had here"):
+        with pytest.raises(TrajectoryError, match="a robot at 'arm' that is not available here"):
             replayed(path)
 
     @pytest.mark.parametrize("mode", ["pd_joint_delta_pos", "pd_ee_delta_pos"])

@@ -43,7 +43,7 @@ def group(**changes) -> JointGroup:
         ({"armature": (0.1,)}, "armature has 1 numbers; the group has joints ('a', 'b')"),
         ({"stiffness": (1.0,)}, "stiffness has 1 numbers; the group has joints ('a', 'b')"),
         ({"damping": (1.0, -2.0)}, "damping is -2.0; it must not be negative"),
-        ({"multipliers": (1.0, -1.0)}, "only a mimic group has multipliers; ('a', 'b') is none"),
+        ({"multipliers": (1.0, -1.0)}, "only a mimic group has multipliers; ('a', 'b') is not one"),
         ({"mimic": True, "offsets": (0.0,)}, "offsets has 1 numbers; the group has joints"),
         (
             {"mimic": True, "offsets": (0.0, math.nan)},
@@ -51,7 +51,7 @@ def group(**changes) -> JointGroup:
         ),
         (
             {"leaders": ("a",), "lead": 0.1},
-            "only a mimic group that is driven to places has leaders; ('a', 'b') is none",
+            "only a mimic group that is driven to places has leaders; ('a', 'b') is not one",
         ),
         (
             {"mimic": True, "leaders": ("b2",), "lead": 0.1},

@@ -63,7 +63,10 @@ def test_their_groups_may_be_named():
     ("limbs", "message"),
     [
         ({"third": Limb("a", 1.0)}, "limb 'third' takes no action number; .* groups are left_arm"),
-        ({"left": Limb("a", 1.0, groups=("lef_arm",))}, "a joint group 'lef_arm', which there is"),
+        (
+            {"left": Limb("a", 1.0, groups=("lef_arm",))},
+            "a joint group 'lef_arm', which does not exist",
+        ),
         ({"body": Limb("a", 1.0)}, "'body' names no limb"),
         ({"left.arm": Limb("a", 1.0)}, "'left.arm' names no limb"),
         (

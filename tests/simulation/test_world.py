@@ -12,7 +12,7 @@ from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.blueprint import read_blueprint
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.scene.shapes import Capsule, Cylinder
-from robot_layouts.simulation.world import Body
+from robot_layouts.simulation.world import WorldBody
 from robots import (
     DescriptorError,
     RobotDescriptor,
@@ -66,13 +66,13 @@ def test_names_are_unique_and_unknown_ones_are_refused():
 def test_mass_comes_from_density(shape: Box | Sphere | Capsule, volume: float):
     world = BuiltWorld(single({"arm": "panda"}))
     for density in (1000.0, 500.0):
-        body = world.add(Body(f"at {density}", (dataclasses.replace(shape, density=density),)))
+        body = world.add(WorldBody(f"at {density}", (dataclasses.replace(shape, density=density),)))
         assert body.component.mass == pytest.approx(density * volume, rel=1e-4)
 
 
 def test_a_cylinder_lies_along_its_x_axis():
     world = BuiltWorld(single({"arm": "panda"}))
-    body = world.add(Body("rod", (Cylinder(radius=0.01, half_length=0.1),)))
+    body = world.add(WorldBody("rod", (Cylinder(radius=0.01, half_length=0.1),)))
     low, high = body.component.compute_global_aabb_tight()
     assert high - low == pytest.approx([0.2, 0.02, 0.02], abs=1e-3)
 

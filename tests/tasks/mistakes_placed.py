@@ -132,7 +132,7 @@ MISTAKES = (
         "a body that is returned",
         building(lambda world: world.add("cube")),
         (
-            "Tray.build() returned Body(name='cube', shapes=(), kind='dyn....0, 0.0), "
+            "Tray.build() returned WorldBody(name='cube', shapes=(), kind....0, 0.0), "
             "anchored=False, marker=False), which has no effect; it adds bodies to a world, "
             "world.add(…), and returns nothing"
         ),

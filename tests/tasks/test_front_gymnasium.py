@@ -177,7 +177,7 @@ class Mine(PickCube):
 class Other(PickCube):
     pass
 
-print(type(gymnasium.make("RobotLayouts/Mine-v3").unwrapped.task).__name__)
+print(type(gymnasium.make("RobotLayouts/Mine-v3").unwrapped.task.task).__name__)
 """
     assert run_python(code) == "Mine"
 

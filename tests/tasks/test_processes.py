@@ -24,7 +24,7 @@ from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
-from tasks.interfaces.workers import WorkerError
+from tasks.interfaces.workers import VectorWorkerError
 from tests.fresh_process import in_fresh_process
 from tests.tasks import breaking
 
@@ -200,7 +200,7 @@ def descriptors(more):
 def test_an_error_of_a_task_arrives_with_its_traceback_and_no_hint_that_leads_nowhere():
     with vector(2, "Breaks_evaluate_late-v1") as env:
         env.reset(seed=30)
-        with pytest.raises(WorkerError) as caught:
+        with pytest.raises(VectorWorkerError) as caught:
             env.step(ACTION)
     message, cause = str(caught.value), str(caught.value.__cause__)
     assert "worker 0 with environments [0] of seeds [30]: process " in message
@@ -213,7 +213,7 @@ def test_an_error_of_a_task_arrives_with_its_traceback_and_no_hint_that_leads_no
 
 @pytest.mark.long
 def test_a_task_that_cannot_be_built_says_where_and_that_there_is_no_vector():
-    with pytest.raises(WorkerError) as caught:
+    with pytest.raises(VectorWorkerError) as caught:
         VectorTask("Breaks_build_soon-v1", 2, num_workers=2)
     message, cause = str(caught.value), str(caught.value.__cause__)
     assert "failed in making its task with ValueError: on purpose" in message

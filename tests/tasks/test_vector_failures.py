@@ -14,7 +14,7 @@ from layouts import face_to_face
 from robot_layouts.core.processes.worker import Worker
 from robots import SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
-from tasks.interfaces.workers import WorkerError
+from tasks.interfaces.workers import VectorWorkerError
 
 GONE, LEFT = [0, 1], [2, 3]  # environments of the first worker and of the second
 ACTION = np.full((4, 8), 0.2, np.float32)
@@ -45,7 +45,7 @@ def test_a_worker_that_fails_is_reported_and_replaced(shared, how):
     victim = first_worker(shared)
     shared._backend.timeout = 30.0 if how == "killed" else 3.0
     os.kill(victim, signal.SIGKILL if how == "killed" else signal.SIGSTOP)
-    with pytest.raises(WorkerError) as caught:
+    with pytest.raises(VectorWorkerError) as caught:
         shared.step(ACTION)
     shared._backend.timeout = 30.0
     error = caught.value
@@ -60,7 +60,7 @@ def test_a_worker_that_fails_is_reported_and_replaced(shared, how):
     expected = reference.step(ACTION)
     for result, wanted in zip(error.results[:4], expected[:4], strict=True):
         np.testing.assert_array_equal(result[LEFT], wanted[LEFT])
-    with pytest.raises(WorkerError, match=r"environments \[0, 1\]"):
+    with pytest.raises(VectorWorkerError, match=r"environments \[0, 1\]"):
         shared.step(ACTION)
     with pytest.raises(TaskError, match=r"environments \[3\] are not gone"):
         shared.restart({3: 5})
@@ -164,19 +164,19 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
     workers_of_it, living = shared._backend.workers, first_worker(shared)
     for worker in [*workers_of_it.values()]:
         os.kill(worker.pid, signal.SIGKILL)
-    with pytest.raises(WorkerError, match=r"environments \[0, 1\].*environments \[2, 3\]"):
+    with pytest.raises(VectorWorkerError, match=r"environments \[0, 1\].*environments \[2, 3\]"):
         shared.step(ACTION)
     start, started = Worker.__init__, []
 
-    def doomed(self, *args):
-        start(self, *args)
+    def doomed(self, *args, **kwargs):
+        start(self, *args, **kwargs)
         if not started:
             os.kill(self.pid, signal.SIGKILL)
         started.append(self)
 
     with monkeypatch.context() as patch:
         patch.setattr(Worker, "__init__", doomed)
-        with pytest.raises(WorkerError, match=r"environments \[0, 1\].*died by SIGKILL"):
+        with pytest.raises(VectorWorkerError, match=r"environments \[0, 1\].*died by SIGKILL"):
             shared.restart()
     assert not workers_of_it
     assert not {living, *(worker.pid for worker in started)} & {*workers()}
@@ -187,7 +187,7 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
 @pytest.mark.long
 def test_an_error_in_a_worker_is_told_with_its_place(shared):
     with pytest.raises(
-        WorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*workers.py"
+        VectorWorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*workers.py"
     ):
         shared._call("no_such_method", {0: ()}, lambda: None)
     shared.restart()

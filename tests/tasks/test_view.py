@@ -10,7 +10,7 @@ from layouts.viewer.page import NO_SLIDERS, save_html
 from robot_layouts.kinematics.rotations import pose_matrix
 from robot_layouts.simulation import Box, Capsule, Cylinder, Sphere
 from robot_layouts.simulation.sapien3.world import BuiltWorld
-from robot_layouts.simulation.world import Body
+from robot_layouts.simulation.world import WorldBody
 from tasks.__main__ import main
 from tasks.view import body_parts, task_cell
 
@@ -27,7 +27,7 @@ TURNED = (0.5, 0.5, -0.5, 0.5)
     ],
 )
 def test_a_body_is_drawn_where_it_collides(shape):
-    body = Body("body", (shape,))
+    body = WorldBody("body", (shape,))
     built = BuiltWorld(single({"arm": "so100"})).add(body)
     (part,) = body_parts(body.shapes)
     corners = part.mesh.vertices

@@ -55,7 +55,7 @@ def _is_own(found: Path) -> bool:
 
 
 def _proper(package: str) -> str:
-    """Return a name like one that is none."""
+    """Return the valid package name that is closest to an invalid one."""
     plain = re.sub(r"[^a-z0-9]+", "_", package.lower()).strip("_")
     return plain if re.fullmatch(r"[a-z](_?[a-z0-9])+", plain) else f"cell_{plain}".strip("_")
 

@@ -38,7 +38,7 @@ from robot_layouts.data.reading.recording import all_files, first_file
 from robot_layouts.data.video import video_problem
 from robots import RecordingError
 from robots.assets.progress import size
-from tasks.cell_options import Cell
+from tasks.cell_options import CellOptions
 
 WIDTH, HEIGHT = 320, 132  # of a chart
 _BASE = HEIGHT - 18  # y of the axis
@@ -352,7 +352,7 @@ def report(
     clearances: Natural = 100,
     clips: Natural = 4,
     task: str | None = None,
-    cell: Cell,
+    cell: CellOptions,
 ) -> None:
     """Write one HTML page on a data set: counts, lengths, sources, variations, clips.
 

@@ -95,10 +95,10 @@ class EvaluationJob(EpisodesJob):
 
     def __call__(self) -> Callable[[int], dict[int, Score]]:
         """Make the task in a worker, and return what plays the episodes of a seed and others."""
-        return _Play(self)
+        return _EvaluationPlay(self)
 
 
-class _Play(EpisodesPlay[EvaluationJob]):
+class _EvaluationPlay(EpisodesPlay[EvaluationJob]):
     def __call__(self, seed: int) -> dict[int, Score]:
         """Play the episodes of a seed and of those that are played together with it."""
         players = [self._casting(seed) for seed in self._job.together[seed]]

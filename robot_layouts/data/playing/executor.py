@@ -44,7 +44,7 @@ class Executor(Protocol):
             that died, and notes meanwhile.
 
         Raises:
-            WorkerError: If no worker can be had.
+            WorkerError: If no worker is available.
             RobotLayoutsError: What ``prepare`` raised.
         """
         ...

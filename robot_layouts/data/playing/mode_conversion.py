@@ -196,7 +196,7 @@ def followed(task: TaskEnv, seed: int, actions: NDArray[np.float32]) -> Recorded
 
 
 def _attempt(
-    references: Mapping[_Group, Reference],
+    references: Mapping[_ConvertedGroup, Reference],
     task: TaskEnv,
     seed: int,
     steps: int,
@@ -223,7 +223,7 @@ def _attempt(
 
 
 def _action(
-    references: Mapping[_Group, Reference], task: TaskEnv, step: int
+    references: Mapping[_ConvertedGroup, Reference], task: TaskEnv, step: int
 ) -> tuple[NDArray[np.float32], bool]:
     """Return the action of one step, (A,), and whether it drives all the way to the references."""
     state = task.simulation.read()
@@ -235,7 +235,7 @@ def _action(
     return action, enough
 
 
-def _groups(source: TaskEnv, task: TaskEnv) -> list[_Group]:
+def _groups(source: TaskEnv, task: TaskEnv) -> list[_ConvertedGroup]:
     """Return the joint groups of a task.
 
     Args:
@@ -249,7 +249,7 @@ def _groups(source: TaskEnv, task: TaskEnv) -> list[_Group]:
         # Relative numbers mean the same only where every step is the same to the last bit.
         _Copied(after, before)
         if same and (all(alike) or not after.group.delta)
-        else _Group(after, before, task)
+        else _ConvertedGroup(after, before, task)
         for (after, before), same in zip(parts, alike, strict=True)
     ]
 
@@ -268,7 +268,7 @@ def _alike(group: JointGroup, before: JointGroup) -> bool:
     return group.ranges == before.ranges and replace(group, **ranges) == replace(before, **ranges)
 
 
-class _Group:
+class _ConvertedGroup:
     """A joint group of the task that is written, and the same group in the mode that is read.
 
     A drive to a position pulls by stiffness · way − damping · velocity, and one to a velocity by
@@ -339,7 +339,7 @@ class _Group:
         return middle + numbers / self._rate
 
 
-class _Copied(_Group):
+class _Copied(_ConvertedGroup):
     """A group that both modes drive alike, so that its numbers are copied."""
 
     def __init__(self, after: DrivenGroup, before: DrivenGroup) -> None:

@@ -111,15 +111,15 @@ class _Actors:
         self._class = ray.remote(_Player).options(
             num_cpus=1, max_restarts=0, max_task_retries=0, scheduling_strategy="SPREAD"
         )
-        self._actors: list[_Actor] = []
+        self._actors: list[_RayActor] = []
 
-    def spawn(self) -> _Actor:
+    def spawn(self) -> _RayActor:
         """Ask for an actor, which begins when a node has room for it."""
         self._cluster.nodes()  # raises if the head is gone, before it is asked
-        self._actors.append(_Actor(self._class.remote()))
+        self._actors.append(_RayActor(self._class.remote()))
         return self._actors[-1]
 
-    def wait(self, seconds: float) -> list[tuple[_Actor, Reply]]:
+    def wait(self, seconds: float) -> list[tuple[_RayActor, Reply]]:
         """Wait for replies for a while (s)."""
         self._cluster.look()
         waiting = {actor.answer: actor for actor in self._actors}
@@ -129,7 +129,7 @@ class _Actors:
         replies = [(waiting[answer], self._receive(waiting[answer])) for answer in ready]
         return [(actor, reply) for actor, reply in replies if reply is not None]
 
-    def remove(self, worker: _Actor, *, kill: bool) -> None:
+    def remove(self, worker: _RayActor, *, kill: bool) -> None:
         """End an actor."""
         self._actors.remove(worker)
         with suppress(self._ray.exceptions.RayError, ValueError):
@@ -144,7 +144,7 @@ class _Actors:
         nodes, free = len(self._cluster.nodes()), self._cluster.free_cpus
         return f"{free} CPUs of the Ray cluster, of {nodes} nodes, are free"
 
-    def _receive(self, actor: _Actor) -> Reply | None:
+    def _receive(self, actor: _RayActor) -> Reply | None:
         try:
             result, error = self._ray.get(actor.answer, timeout=_FETCH_SECONDS)
         except self._ray.exceptions.RayError as death:
@@ -158,7 +158,7 @@ class _Actors:
             error.args = (f"{error} (on node {actor.home.address})", *error.args[1:])
         return Reply(0, Status.FAILED, error)
 
-    def _died(self, actor: _Actor, error: Exception) -> Reply:
+    def _died(self, actor: _RayActor, error: Exception) -> Reply:
         alive, reason = self._cluster.nodes(), _reason(error)
         out_of_reach = isinstance(error, self._ray.exceptions.ActorUnavailableError)
         if out_of_reach or "node" in reason or (actor.home and actor.home.node not in alive):
@@ -183,7 +183,7 @@ class _Home:
     packages: dict[str, str]
 
 
-class _Actor:
+class _RayActor:
     """One actor, as seen from here; it plays one seed at a time.
 
     Attributes:

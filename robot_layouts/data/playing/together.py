@@ -27,7 +27,7 @@ from robot_layouts.experts.registry import Expert
 from robots import ActionError, TaskError
 from tasks import MultiRobotTask, Scenario, TaskEnv
 from tasks.engine.actions import ActionReader
-from tasks.episode import REBUILT, Moment, PlayedEpisode, Policy, Score, States, open_loop
+from tasks.episode import REBUILT, PlayedEpisode, Policy, Score, States, StepResult, open_loop
 
 Row = NDArray[np.float32]
 
@@ -81,7 +81,7 @@ class EpisodePlayer:
     corrector: Policy | None = None
     rehearsed: PlayedEpisode | None = None
     choices: list[ChosenAction] = field(default_factory=list[ChosenAction])
-    moments: list[Moment] = field(default_factory=list[Moment])
+    moments: list[StepResult] = field(default_factory=list[StepResult])
 
     @property
     def over(self) -> bool:
@@ -230,7 +230,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
         rows = list(zip(*(column.tolist() for column in columns), strict=True))
         for i in running:
             reward, success, ended, late = rows[i]
-            moment = Moment(None, reward, bool(success), ended, late, seconds)
+            moment = StepResult(None, reward, bool(success), ended, late, seconds)
             players[i].choices.append(choices[i])
             players[i].moments.append(moment)
         yield

@@ -2,7 +2,7 @@
 
 pyfive reads them, which is written in Python: a damaged file cannot crash it. An h5 file may still
 name other files, declare arrays of any size, pack gigabytes into a few bytes, contain itself, or
-lead whoever follows it in circles. What is declared is therefore checked before it is read, and
+lead a reader in circles. What is declared is therefore checked before it is read, and
 `limited` ends what takes too long or too much memory.
 """
 

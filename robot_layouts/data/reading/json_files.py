@@ -59,7 +59,7 @@ class _Reset(TypedDict, total=False):
     options: Object | None
 
 
-class _Actor(TypedDict):
+class _ActorJson(TypedDict):
     kind: Name
     name: AnyText
     sha256: NotRequired[AnyText | None]
@@ -67,8 +67,8 @@ class _Actor(TypedDict):
 
 class _Source(TypedDict):
     kind: Name
-    actors: NotRequired[list[_Actor]]
-    corrects: NotRequired[_Actor]
+    actors: NotRequired[list[_ActorJson]]
+    corrects: NotRequired[_ActorJson]
 
 
 class _Played(TypedDict, total=False):

@@ -80,7 +80,7 @@ NEWER_IN_PARTS = (", approximate_ik=False", ", opening_axes=((0.0, 1.0, 0.0), (0
 
 
 # What `describe_layout` and `describe_simulation` write, as far as it is read again.
-class _Place(TypedDict):
+class _PlaceJson(TypedDict):
     robot: Name
     position: Annotated[list[Finite], length(3)]
     quaternion: Annotated[list[Finite], length(4)]
@@ -98,7 +98,7 @@ class _Simulation(TypedDict, total=False):
     randomization: Object
 
 
-LAYOUT = dict[str, _Place] | None
+LAYOUT = dict[str, _PlaceJson] | None
 SIMULATION = _Simulation | None
 
 

@@ -16,7 +16,7 @@ from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
 from tasks.randomization.declaration import Randomization
 
-MOST_ROBOTS = 64  # each takes memory, whoever wrote the file
+MOST_ROBOTS = 64  # each takes memory, and a file may come from anyone
 
 
 def task_class(file: Recording, task_id: str | None = None) -> type[MultiRobotTask]:
@@ -100,7 +100,7 @@ def _varied(file: Recording) -> Randomization | None:
         return None if described is None else Randomization.from_json(described)
     except RobotLayoutsError as error:
         raise TrajectoryError(
-            f"{file.path} has a randomization that makes no sense here: {error}"
+            f"{file.path} has a randomization that is invalid here: {error}"
         ) from error
 
 
@@ -143,8 +143,8 @@ def layout_again(
         source: The file, for errors.
 
     Raises:
-        UnknownNameError: If a robot is given for a place that there is not.
-        TrajectoryError: If a robot cannot be had here, or it is no layout.
+        UnknownNameError: If a robot is given for a place that does not exist.
+        TrajectoryError: If a robot is not available here, or it is no layout.
     """
     for place in robots:
         if place not in described:
@@ -177,7 +177,7 @@ def layout_again(
             raise
         except RobotLayoutsError as error:
             raise TrajectoryError(
-                f"{source} has a robot at {place!r} that cannot be had here:"
+                f"{source} has a robot at {place!r} that is not available here:"
                 f" {str(error).rstrip('.')}; name the robot, with --robots {place}=… or"
                 f" robots={{{place!r}: …}}"
             ) from error

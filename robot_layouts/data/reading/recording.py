@@ -73,7 +73,7 @@ class Trajectory:
         success: Shape (T,), or None.
         terminated: Shape (T,), or None.
         truncated: Shape (T,), or None.
-        rebuilt: Whether its reset rebuilt the world, so that its states can be had again to the
+        rebuilt: Whether its reset rebuilt the world, so that its states can be reached again to the
             last bit; where worlds are reused, they also depend on the episodes before.
         source: Who acted; None if the file does not say.
         drawn: What was varied in its world, by axis; None if nothing was.

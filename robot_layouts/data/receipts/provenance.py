@@ -51,7 +51,7 @@ _MAIN = "__main__"  # a script or a notebook, which cannot be imported
 _VARIABLE = re.compile(r"""\b(?:environ(?:\.get\(|\[)|getenv\()\s*["'](\w+)["']""")
 
 
-class _Making(TypedDict):
+class _ProvenanceMaking(TypedDict):
     layout: LAYOUT
     obs_mode: Name
     reward_mode: Name
@@ -132,7 +132,7 @@ def make_again(
         ReceiptError: If it is invalid, or a robot is not available here.
     """
     try:
-        arguments = check(dict(making), _Making, "making")
+        arguments = check(dict(making), _ProvenanceMaking, "making")
         arguments.pop("num_envs", None)
         check(dict(guessed), GUESSED, "guessed")
         layout = layout_again(making["layout"], guessed, cls.layout, robots, "the receipt")

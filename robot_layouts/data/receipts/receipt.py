@@ -60,7 +60,7 @@ class _Environment(TypedDict):
     variables: NotRequired[AnyText]
 
 
-class _Episode(TypedDict):
+class _ReceiptEpisode(TypedDict):
     seed: Annotated[int, whole(0, MAX_SEED)]
     success: bool
     steps: Annotated[int, whole(0, MAX_STEPS)]
@@ -77,7 +77,7 @@ class _Receipt(TypedDict):
     policy: _Policy
     making: _Making
     environment: _Environment
-    episodes: list[_Episode]
+    episodes: list[_ReceiptEpisode]
 
 
 class ReceiptError(RobotLayoutsError, ValueError):
@@ -113,7 +113,7 @@ class EpisodeReceipt:
             ReceiptError: If a value is of another kind, or the trace has another length.
         """
         about = f"the episode of seed {self.seed!r}"
-        vars(self).update(check(asdict(self), _Episode, about, ReceiptError))
+        vars(self).update(check(asdict(self), _ReceiptEpisode, about, ReceiptError))
         try:
             length = len(b64decode(self.trace, validate=True))
         except (NotBase64, ValueError):

@@ -35,7 +35,7 @@ def claim(folder: Path, *, certain: bool = False) -> int | None:
             folder.mkdir()
         try:
             descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        except FileNotFoundError:  # whoever held the lock has just removed the folder
+        except FileNotFoundError:  # the process that held the lock has just removed the folder
             if folder.is_symlink():
                 raise
             continue

@@ -142,10 +142,10 @@ class EpisodeJob(EpisodesJob):
         Raises:
             RecordingError: If the robot files of this machine are not those of the recording.
         """
-        return _Play(self)
+        return _RecordingPlay(self)
 
 
-class _Play(EpisodesPlay[EpisodeJob]):
+class _RecordingPlay(EpisodesPlay[EpisodeJob]):
     """Plays episodes, and encodes them."""
 
     def __init__(self, job: EpisodeJob) -> None:

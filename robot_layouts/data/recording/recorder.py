@@ -77,7 +77,7 @@ class OpenFile:
         episodes: Its episodes by seed, ascending.
         sources: What its header says of its source, unless it is empty.
         lost: Seeds of episodes that it held, and that are damaged.
-        whole: Whether there is nothing to mend in the h5 file.
+        whole: Whether there is nothing to repair in the h5 file.
     """
 
     number: int
@@ -96,7 +96,7 @@ class JoinedFiles:
         manifest: Where the manifest is.
         paths: The h5 files that are there, or that the manifest lists, the first one first.
         last: The last file.
-        mending: Full files of which episodes are damaged, by number.
+        to_repair: Full files of which episodes are damaged, by number.
         seeds: Seeds of the episodes of all files.
         damaged: What is damaged, in words.
     """
@@ -115,7 +115,7 @@ class JoinedFiles:
         self._entries: list[FileEntry] = []  # of the full files
         self._last_entry: FileEntry | None = None
         self.last = OpenFile(0)
-        self.mending: dict[int, OpenFile] = {}
+        self.to_repair: dict[int, OpenFile] = {}
         self.seeds = set[int]()
         self.damaged: list[str] = []
         self._listed = self._read_manifest()
@@ -288,7 +288,7 @@ class JoinedFiles:
             )
         file = self._read_all(number, path, entry)
         if entry is not None and file.lost:
-            self.mending[number] = file
+            self.to_repair[number] = file
             self._entries.append(entry)
         else:
             self.write(file, {s: held.group for s, held in file.episodes.items()}, last=False)
@@ -307,7 +307,7 @@ class JoinedFiles:
             )
 
 
-class _Part(NamedTuple):
+class _FinishedEpisode(NamedTuple):
     """A finished episode that is not joined yet: its size (bytes), and what its header says."""
 
     size: int
@@ -366,7 +366,7 @@ class Recorder:
             RecordingError: If there is a recording already and neither ``overwrite`` nor
                 ``resume``, it is of something else or in use by another process, or the folder
                 cannot be written.
-            TaskError: If the size makes no sense.
+            TaskError: If the size is invalid.
             AssetError: If robot files cannot be found.
         """
         if not 0 < file_size < math.inf:
@@ -376,7 +376,7 @@ class Recorder:
         self.parts = self.path.with_suffix(".parts")
         self.damaged: list[str] = []
         self._header, self._limit = describe_task(task, source, source_desc), file_size * 1e6
-        self._waiting: dict[int, _Part] = {}  # by seed
+        self._waiting: dict[int, _FinishedEpisode] = {}  # by seed
         self._coming: deque[int] = deque()
         self._given_up = set[int]()
         with disk_errors(self.path):
@@ -449,7 +449,7 @@ class Recorder:
         if seed in self.seeds:
             raise RecordingError(f"{self.path} has an episode of seed {seed} already")
         write_part(self.parts, seed, part)
-        self._waiting[seed] = _Part(part_size(part), source_of(self._header))
+        self._waiting[seed] = _FinishedEpisode(part_size(part), source_of(self._header))
         while (full := self._full_file()) is not None:
             self._fill_last(full)
 
@@ -512,7 +512,7 @@ class Recorder:
         if seed_of(part) in self._files.seeds:
             part.unlink()
         else:
-            self._waiting[seed_of(part)] = _Part(stored.size, source_of(header))
+            self._waiting[seed_of(part)] = _FinishedEpisode(stored.size, source_of(header))
 
     def _full_file(self, *, certain: bool = False) -> list[int] | None:
         """Return the seeds of the next full file; None if there is not enough for one.
@@ -520,7 +520,7 @@ class Recorder:
         Args:
             certain: Whether not to wait for those that are expected before.
         """
-        lost = {seed for file in self._files.mending.values() for seed in file.lost}
+        lost = {seed for file in self._files.to_repair.values() for seed in file.lost}
         sizes = {seed: held.size for seed, held in self._files.last.episodes.items()}
         sizes |= {seed: part.size for seed, part in self._waiting.items() if seed not in lost}
         if sum(sizes.values()) <= self._limit:
@@ -551,7 +551,7 @@ class Recorder:
         spilt = [seed for seed in file.episodes if seed not in set(seeds)]
         for seed, stored in self._files.read_groups(file, spilt) if spilt else ():
             write_part(self.parts, seed, encoder.encode_stored(stored), sync=True)
-            self._waiting[seed] = _Part(stored.size, source_of(header))
+            self._waiting[seed] = _FinishedEpisode(stored.size, source_of(header))
         self._write(file, seeds, last=False)
 
     def _write(self, file: OpenFile, seeds: Iterable[int], *, last: bool) -> None:
@@ -566,7 +566,7 @@ class Recorder:
             self._waiting.pop(seed, None)
 
     def _join(self) -> None:
-        for file in self._files.mending.values():
+        for file in self._files.to_repair.values():
             if again := file.lost & self._waiting.keys():
                 self._write(file, {*file.episodes, *again}, last=False)
         waiting = sum(part.size for part in self._waiting.values())

@@ -30,7 +30,7 @@ def show(suite: SuiteName, *, task: Tasks = ()) -> None:
         task: Tasks of the suite that no installed package lists, whose modules are imported.
 
     Raises:
-        RobotLayoutsError: If there is no such suite, or it makes no sense.
+        RobotLayoutsError: If there is no such suite, or it is invalid.
     """
     from robot_layouts.data.suite.suite import load_suite
 
@@ -62,7 +62,7 @@ def run(
         players: Who plays.
 
     Raises:
-        RobotLayoutsError: If a suite or a policy makes no sense.
+        RobotLayoutsError: If a suite or a policy is invalid.
     """
     from robot_layouts.core.progress import Progress
     from robot_layouts.data.suite.report import summary
@@ -125,7 +125,7 @@ def verify(folder: RunFolder, *, policy: Policies = (), task: Tasks = (), player
         players: Who plays.
 
     Raises:
-        RobotLayoutsError: If a run or a policy makes no sense.
+        RobotLayoutsError: If a run or a policy is invalid.
     """
     from robot_layouts.core.progress import Progress
     from robot_layouts.data.suite.run import read_run, verify_run

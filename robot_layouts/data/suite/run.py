@@ -326,8 +326,8 @@ def chosen_policies(suite: Suite, cases: Sequence[Case], given: Any = None) -> d
 
     Raises:
         UnknownNameError: If a task is unknown.
-        TaskError: If a policy cannot be had or is given twice, a task has no expert, or a case has
-            no policy.
+        TaskError: If a policy is unavailable or given twice, a task has no expert, or a case has no
+            policy.
     """
     by_task = _by_task(given if given is not None else suite.policies or EXPERT)
     found: dict[str, Any] = {}
@@ -343,7 +343,7 @@ def chosen_policies(suite: Suite, cases: Sequence[Case], given: Any = None) -> d
 
 
 def _by_task(given: Any) -> dict[str, Any]:
-    """Return policies, or names of them, by the ids of tasks and `OTHERS`; all can be had."""
+    """Return policies, or names of them, by the ids of tasks and `OTHERS`; all are available."""
     several = given if isinstance(given, Mapping) else {OTHERS: given}
     found: dict[str, Any] = {}
     for task, policy in several.items():

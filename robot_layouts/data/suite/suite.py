@@ -418,7 +418,7 @@ def written_layout(layout: Layout, folder: Path) -> dict[str, Any]:
     Raises:
         LayoutError: See `layouts.Layout.to_yaml`.
     """
-    data = yaml.load(layout.to_yaml(folder), _Loader)
+    data = yaml.load(layout.to_yaml(folder), _SuiteLoader)
     del data["version"]
     return data
 
@@ -454,7 +454,7 @@ def _below(folder: Path, name: str) -> Path:
     )
 
 
-class _Loader(yaml.SafeLoader):
+class _SuiteLoader(yaml.SafeLoader):
     """Reads the numbers of `Layout.to_yaml`, and all else as texts."""
 
     yaml_implicit_resolvers = {

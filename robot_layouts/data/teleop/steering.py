@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from robot_layouts.experts.motion_drives import Aim, MotionDrive, drive_within_bounds
 from robot_layouts.experts.script import CLOSED, OPEN
-from robot_layouts.experts.tips import link_tree
 from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
@@ -17,10 +16,11 @@ from robot_layouts.kinematics.rotations import (
     rotation_about,
     rotation_vector,
 )
-from robot_layouts.kinematics.solve import Goal, approach
+from robot_layouts.kinematics.solve import IkGoal, approach
 from robot_layouts.simulation import State
 from robots import TaskError
 from robots.action_split import is_gripper
+from robots.gripper_motion import link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 from tasks.driving import DrivenGroup, driven_groups, joint_slices
@@ -88,7 +88,7 @@ class _Arm:
         way = _shortened(wanted[:3, 3] - place, SPEED * seconds)
         turn = _shortened(rotation_vector(wanted[:3, :3] @ rotation.T), TURN_SPEED * seconds)
         turned = _turn(turn) @ rotation if self.turns else None
-        goal = Goal(place + way, self._links, turned, self._turned, self._offset)
+        goal = IkGoal(place + way, self._links, turned, self._turned, self._offset)
         moved = joints.copy()
         longest = self._fastest * seconds
         moved[self._own] = approach(self._tree, goal, qpos, self._free, longest, self._rest)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from robot_layouts.kinematics.rotations import Floats, transform
 from robot_layouts.motion.collision.spheres import BALLS, SphereCluster, clusters_of
-from robot_layouts.motion.model.bodies import WORLD, Bodies, Solid
+from robot_layouts.motion.model.bodies import WORLD, Bodies, CellSolid
 from robot_layouts.motion.model.link_poses import LinkPoses
 from robots.bodies.hulls import Hull
 
@@ -422,7 +422,7 @@ def _gather_flats(flats: Mapping[int, Floats]) -> _Flats:
     return _Flats(np.array([*flats], np.intp), sides[..., :3].copy(), sides[..., 3].copy())
 
 
-def _sides(solid: Solid) -> Floats | None:
+def _sides(solid: CellSolid) -> Floats | None:
     """Return the sides of a body that never moves: normals and distances from the origin, (s, 4).
 
     None if it moves, is a robot's, or has too many.

@@ -47,7 +47,7 @@ class Cell(Bodies):
             except_: Pairs that may touch; each a pair of names of `names`.
 
         Raises:
-            LayoutError: If a distance makes no sense.
+            LayoutError: If a distance is invalid.
             UnknownNameError: If there is no such robot or body.
         """
         clearance = _distance("clearance", clearance)

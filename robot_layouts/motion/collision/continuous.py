@@ -78,7 +78,7 @@ class CurveCheck(NamedTuple):
     sparse: Floats
 
 
-class _Check:
+class _CurveCheck:
     """A look along a curve; see `check_along`."""
 
     def __init__(
@@ -166,7 +166,7 @@ def check_along(
     Raises:
         MotionError: If that takes too many moments.
     """
-    return _Check(cell, checker, curve, step, turn).run()
+    return _CurveCheck(cell, checker, curve, step, turn).run()
 
 
 def _cut(ways: Intervals, pieces: Floats) -> tuple[Floats, Floats]:

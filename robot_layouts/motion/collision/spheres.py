@@ -52,7 +52,7 @@ def clusters_of(hulls: tuple[Hull, ...]) -> tuple[SphereCluster, ...]:
         hulls: The hulls.
     """
     pieces = [_Piece(i, hull.corners, _own_axes(hull.corners)) for i, hull in enumerate(hulls)]
-    groups = [_Group(pieces)]
+    groups = [_PieceGroup(pieces)]
     while True:
         cuts = [(group.radius, i) for i, group in enumerate(groups) if _is_cut(group, len(groups))]
         if not cuts:
@@ -61,7 +61,7 @@ def clusters_of(hulls: tuple[Hull, ...]) -> tuple[SphereCluster, ...]:
         groups[worst : worst + 1] = groups[worst].halves
 
 
-def _is_cut(group: _Group, groups: int) -> bool:
+def _is_cut(group: _PieceGroup, groups: int) -> bool:
     """Whether a group becomes two."""
     if len(group.pieces) > BALLS:
         return True
@@ -88,7 +88,7 @@ class _Piece:
         return [_Piece(self.hull, part, self.axes) for part in _cut(self.corners, heights)]
 
 
-class _Group:
+class _PieceGroup:
     """Pieces that lie together, and the ball around them."""
 
     def __init__(self, pieces: list[_Piece]) -> None:
@@ -98,14 +98,14 @@ class _Group:
         self.middle, self.radius = ball_around(self.corners)
 
     @cached_property
-    def halves(self) -> list[_Group]:
+    def halves(self) -> list[_PieceGroup]:
         """Both halves: of the one piece, or of the pieces in order along the longest side."""
         if len(self.pieces) == 1:
-            return [_Group([half]) for half in self.pieces[0].halves]
+            return [_PieceGroup([half]) for half in self.pieces[0].halves]
         axis = int(np.ptp(self.corners, axis=0).argmax())
         pieces = sorted(self.pieces, key=lambda piece: float(piece.middle[axis]))
         half = len(pieces) // 2
-        return [_Group(pieces[:half]), _Group(pieces[half:])]
+        return [_PieceGroup(pieces[:half]), _PieceGroup(pieces[half:])]
 
     def cluster(self) -> SphereCluster:
         """Return the balls of the pieces, cut until there are enough."""

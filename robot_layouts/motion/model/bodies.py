@@ -49,7 +49,7 @@ class RigidBody:
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class CellSolid:
     """A convex body of the cell.
 
     Attributes:
@@ -105,7 +105,7 @@ class Bodies:
             table: A table's top as x_min, y_min, x_max, y_max (m), at height 0.
 
         Raises:
-            AssetError: If a robot's files cannot be found or make no sense.
+            AssetError: If a robot's files cannot be found or are invalid.
             LayoutError: If two bodies have one name, obstacles have too many parts, or an argument
                 is of another type.
             MissingPackageError: If trimesh or python-fcl is not installed.
@@ -144,7 +144,7 @@ class Bodies:
         self._check_names()
         self._part_of: dict[tuple[str, int], int] = {}
         self.parts = self._gather_parts()
-        self.solids: tuple[Solid, ...] = tuple(self._gather_solids())
+        self.solids: tuple[CellSolid, ...] = tuple(self._gather_solids())
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -199,26 +199,26 @@ class Bodies:
         tracks = [o.pose for o in self.obstacles if isinstance(o.pose, Track)]
         return (*parts, *(RigidBody(track=track) for track in tracks))
 
-    def _gather_solids(self) -> Iterator[Solid]:
+    def _gather_solids(self) -> Iterator[CellSolid]:
         for name, model in self.models.items():
             for i, hull in enumerate(model.hulls):
                 part, offset = self._carried(name, hull.link)
-                yield Solid(f"{name}/{model.link_name(i)}", name, name, part, hull, offset)
+                yield CellSolid(f"{name}/{model.link_name(i)}", name, name, part, hull, offset)
         for name, hull in self.tables.items():
-            yield Solid(name, name, "", WORLD, hull, np.eye(4))
+            yield CellSolid(name, name, "", WORLD, hull, np.eye(4))
         tracked = len(self.parts) - sum(obstacle.moves for obstacle in self.obstacles)
         for obstacle in self.obstacles:
             part = tracked if obstacle.moves else WORLD
             tracked += obstacle.moves
             offset = np.eye(4) if obstacle.moves else obstacle.poses(None, 1)[0]
             for hull in obstacle.hulls:
-                yield Solid(obstacle.name, obstacle.name, "", part, hull, offset)
+                yield CellSolid(obstacle.name, obstacle.name, "", part, hull, offset)
         for held in self.held:
             robot, link = self.tcp(held.place)
             part, offset = self._carried(robot, link)
             pose = offset @ held.obstacle.poses(None, 1)[0]
             for hull in held.obstacle.hulls:
-                yield Solid(held.obstacle.name, held.obstacle.name, robot, part, hull, pose)
+                yield CellSolid(held.obstacle.name, held.obstacle.name, robot, part, hull, pose)
 
     def _carried(self, robot: str, link: int) -> tuple[int, Floats]:
         """Return the part that carries a link, and the link's pose in its frame."""
@@ -245,7 +245,7 @@ class Bodies:
 
     @cached_property
     def counted_pairs(self) -> NDArray[np.intp]:
-        """The pairs of solids that may not touch, whoever moves, (m, 2)."""
+        """The pairs of solids that may not touch, whichever of them move, (m, 2)."""
         firsts = np.cumsum([0, *(len(model.hulls) for model in self.models.values())])
         links, others = range(firsts[-1]), range(firsts[-1], len(self.solids))
         owners = np.repeat(np.arange(len(self.models)), np.diff(firsts))

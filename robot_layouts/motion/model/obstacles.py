@@ -45,7 +45,7 @@ class Track:
         """Refuse times and poses that do not fit each other.
 
         Raises:
-            LayoutError: If they do not, or one of them makes no sense.
+            LayoutError: If they do not, or one of them is invalid.
         """
         times, poses = _array("a track's times", self.times), _array("its poses", self.poses)
         if times.ndim != 1 or not len(times) or poses.shape != (len(times), 4, 4):
@@ -210,7 +210,7 @@ def box(
         quaternion: Its orientation, wxyz.
 
     Raises:
-        LayoutError: If a number makes no sense.
+        LayoutError: If a number is invalid.
     """
     lengths = checked_numbers(f"the size of {name}", size, 3, FAR, LayoutError, "m")
     for length in lengths:
@@ -228,7 +228,7 @@ def sphere(name: str, radius: float, position: Sequence[float] = (0.0, 0.0, 0.0)
         position: Its middle (m).
 
     Raises:
-        LayoutError: If a number makes no sense.
+        LayoutError: If a number is invalid.
     """
     radius = _positive(f"the radius of {name}", radius)
     require_packages()
@@ -257,7 +257,7 @@ def cylinder(
         quaternion: Its orientation, wxyz.
 
     Raises:
-        LayoutError: If a number makes no sense.
+        LayoutError: If a number is invalid.
     """
     radius = _positive(f"the radius of {name}", radius) / np.cos(np.pi / SIDES)
     half = _positive(f"the length of {name}", length) / 2
@@ -285,7 +285,7 @@ def mesh(
 
     Raises:
         AssetError: If the mesh cannot be read, or has no volume.
-        LayoutError: If a number makes no sense.
+        LayoutError: If a number is invalid.
         MissingPackageError: If trimesh is not installed.
     """
     from robots.urdf.mesh_files import read_corners

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from layouts.viewer import Cell, Motion, Thing
-from layouts.visuals import Part, coloured
+from layouts.viewer import ShownCell, ShownMotion, Thing
+from layouts.visuals import Visual, coloured
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robot_layouts.motion.model.obstacles import Obstacle, Track
 from robot_layouts.motion.output.protocol import TimedMotion
@@ -19,11 +19,11 @@ HELD = (0.95, 0.75, 0.2, 1.0)
 TABLE = (0.87, 0.81, 0.72, 1.0)
 
 
-def motion_cell(motion: TimedMotion, title: str) -> Cell:
+def motion_cell(motion: TimedMotion, title: str) -> ShownCell:
     """Return what a page shows of a motion.
 
     Raises:
-        AssetError: If a robot's files cannot be found or make no sense.
+        AssetError: If a robot's files cannot be found or are invalid.
         MissingPackageError: If trimesh or python-fcl is not installed.
     """
     scenes = Scenes(motion)
@@ -41,8 +41,8 @@ def motion_cell(motion: TimedMotion, title: str) -> Cell:
         poses[held.obstacle.name] = rows
     if motion.table is not None:
         things["(table)"] = Thing((_slab(*motion.table),), np.eye(7)[3])
-    own = Motion(float(times[1]), motion.sample(times), poses, name="Motion")
-    return Cell(title, motion.layout, things, own, ways=_ways(scenes), hidden=HIDDEN)
+    own = ShownMotion(float(times[1]), motion.sample(times), poses, name="Motion")
+    return ShownCell(title, motion.layout, things, own, ways=_ways(scenes), hidden=HIDDEN)
 
 
 def _ways(scenes: Scenes) -> dict[str, list[Floats]]:
@@ -54,13 +54,13 @@ def _ways(scenes: Scenes) -> dict[str, list[Floats]]:
     return ways
 
 
-def _parts(obstacle: Obstacle, rgba: tuple[float, float, float, float]) -> tuple[Part, ...]:
+def _parts(obstacle: Obstacle, rgba: tuple[float, float, float, float]) -> tuple[Visual, ...]:
     import trimesh
 
     return tuple(coloured(trimesh.convex.convex_hull(shape), rgba) for shape in obstacle.shapes)
 
 
-def _slab(x_min: float, y_min: float, x_max: float, y_max: float) -> Part:
+def _slab(x_min: float, y_min: float, x_max: float, y_max: float) -> Visual:
     """Return a table's top, just below z = 0."""
     import trimesh
 

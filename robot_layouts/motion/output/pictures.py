@@ -19,7 +19,7 @@ from robot_layouts.core.progress import Progress
 from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import forward
 from robot_layouts.kinematics.rotations import Floats, transform
-from robot_layouts.motion.model.bodies import Solid
+from robot_layouts.motion.model.bodies import CellSolid
 from robot_layouts.motion.output.protocol import TimedMotion
 from robot_layouts.motion.output.scenes import Scenes
 from robots import MissingPackageError
@@ -178,7 +178,7 @@ class _Picture:
         self._draw_speeds(self._strips[1])
 
     def _draw_bodies(
-        self, bodies: Sequence[tuple[Solid, Floats]], white: float, level: float, *, edges: bool
+        self, bodies: Sequence[tuple[CellSolid, Floats]], white: float, level: float, *, edges: bool
     ) -> Any:
         """Draw outlines from above, the highest last.
 
@@ -201,7 +201,7 @@ class _Picture:
         )
         return self._plan.add_collection(drawn, autolim=False)
 
-    def _ink(self, solid: Solid, white: float) -> tuple[Any, Any]:
+    def _ink(self, solid: CellSolid, white: float) -> tuple[Any, Any]:
         """Return the colour of a body, and that of its edge."""
         if solid.mover:
             colour = self._colour(solid.mover)

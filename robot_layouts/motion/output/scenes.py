@@ -10,7 +10,7 @@ from layouts.layout import Layout
 from robot_layouts.kinematics.rotations import Floats, transform
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.checker import Checker
-from robot_layouts.motion.model.bodies import Solid
+from robot_layouts.motion.model.bodies import CellSolid
 from robot_layouts.motion.model.obstacles import Held
 from robot_layouts.motion.output.protocol import TimedMotion
 from robot_layouts.motion.timing import velocities
@@ -39,7 +39,7 @@ class Scenes:
         """Read the robots' files.
 
         Raises:
-            AssetError: If they cannot be found or make no sense.
+            AssetError: If they cannot be found or are invalid.
             MissingPackageError: If trimesh or python-fcl is not installed.
         """
         self.motion = motion
@@ -50,16 +50,16 @@ class Scenes:
         sampled = self.motion.sample(times)
         return np.concatenate([sampled[name] for name in self.cell.robots], axis=1)
 
-    def standing(self) -> list[Solid]:
+    def standing(self) -> list[CellSolid]:
         """Return tables, and obstacles that do not move."""
         return [solid for solid in self.cell.solids if _stands(self.cell, solid)]
 
-    def moving(self, time: float) -> list[tuple[Solid, Floats]]:
+    def moving(self, time: float) -> list[tuple[CellSolid, Floats]]:
         """Return all other bodies at a time, with their corners, (n, 3) (m, world)."""
         cell, moments = self.cell, np.array([time])
         links = cell.poses(self.states(moments))[0]
         at = {link: links[i] for i, link in enumerate(cell.links)}
-        found: list[tuple[Solid, Floats]] = []
+        found: list[tuple[CellSolid, Floats]] = []
         for solid in cell.solids:
             part, pose = cell.parts[solid.part], np.eye(4)
             if part.track is not None:
@@ -111,7 +111,7 @@ class Scenes:
         }
 
 
-def _stands(cell: Cell, solid: Solid) -> bool:
+def _stands(cell: Cell, solid: CellSolid) -> bool:
     return not solid.mover and cell.parts[solid.part].track is None
 
 

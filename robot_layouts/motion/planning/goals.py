@@ -98,7 +98,7 @@ Goal = TcpGoal | RegionGoal | Sequence[float]
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class PlaceGoal:
     """What one place is to do.
 
     Attributes:
@@ -118,7 +118,7 @@ class Target:
     others: Callable[[], Floats]
 
 
-def read_targets(cell: Cell, goals: Mapping[str, Goal], start: Floats) -> tuple[Target, ...]:
+def read_targets(cell: Cell, goals: Mapping[str, Goal], start: Floats) -> tuple[PlaceGoal, ...]:
     """Return what each place is to do, in the order of the goals.
 
     Args:
@@ -127,7 +127,7 @@ def read_targets(cell: Cell, goals: Mapping[str, Goal], start: Floats) -> tuple[
         start: Where all joints are, (D,) (rad, m).
 
     Raises:
-        MotionError: If a goal makes no sense, or two places share joints.
+        MotionError: If a goal is invalid, or two places share joints.
         NoPlanError: If a place cannot get there.
         UnknownNameError: If there is no such place.
     """
@@ -156,7 +156,7 @@ def arm_joints(robot: RobotDescriptor) -> tuple[str, ...]:
     return tuple(joint for group in (named or groups).values() for joint in group.joints)
 
 
-def _target(cell: Cell, place: str, goal: Goal, start: Floats) -> Target:
+def _target(cell: Cell, place: str, goal: Goal, start: Floats) -> PlaceGoal:
     robot = cell.layout.owner(place)
     arm, own = cell.layout.arm(place).robot, cell.layout[robot].robot
     first = cell.slices[robot].start
@@ -164,7 +164,7 @@ def _target(cell: Cell, place: str, goal: Goal, start: Floats) -> Target:
         columns = np.array([own.joints.index(joint) for joint in arm_joints(arm)], np.intp)
         postures = _Postures(cell, place, goal, start[cell.slices[robot]], columns)
         found = postures.first()
-        return Target(place, robot, columns + first, found, str(goal), postures.others)
+        return PlaceGoal(place, robot, columns + first, found, str(goal), postures.others)
     joints, values = _joint_goal(place, arm, goal)
     columns = np.array([own.joints.index(joint) for joint in joints], np.intp)
     _expect_within_limits(place, joints, values, cell.limits[columns + first])
@@ -172,7 +172,7 @@ def _target(cell: Cell, place: str, goal: Goal, start: Floats) -> Target:
     kept = arms | (values != start[columns + first])
     columns, values = columns[kept], values[kept]
     none = np.empty((0, len(columns)))
-    return Target(place, robot, columns + first, values[None], "joint positions", lambda: none)
+    return PlaceGoal(place, robot, columns + first, values[None], "joint positions", lambda: none)
 
 
 def _joint_goal(
@@ -287,7 +287,7 @@ class _Postures:
         """Return what a world pose of the TCP leads to from each start."""
         pose = self._back @ pose_matrix(position, IDENTITY if quaternion is None else quaternion)
         tcp = self._tcp
-        goal = inverse.Goal(
+        goal = inverse.IkGoal(
             pose[:3, 3],
             tcp.links,
             None if quaternion is None else pose[:3, :3],

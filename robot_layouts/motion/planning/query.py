@@ -15,7 +15,7 @@ from robot_layouts.core.progress import Progress
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.clearances import Clearances
-from robot_layouts.motion.planning.goals import CANDIDATES, Target, different
+from robot_layouts.motion.planning.goals import CANDIDATES, PlaceGoal, different
 from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs
 from robot_layouts.motion.planning.prioritized import coordinated
 from robot_layouts.motion.planning.rrt_connect import connect
@@ -38,7 +38,7 @@ RADIANS_PER_METRE = 5.0  # how far links may turn between two of them, beside ho
 
 
 def find_goal_configurations(
-    targets: Sequence[Target], clearances: Clearances, base: Floats, time: float
+    targets: Sequence[PlaceGoal], clearances: Clearances, base: Floats, time: float
 ) -> Floats:
     """Return all coordinates at some combinations of goals, best first, (n, D).
 
@@ -53,12 +53,12 @@ def find_goal_configurations(
     Raises:
         NoPlanError: If something overlaps in all of them.
     """
-    return _Search(targets, clearances, base, time).found()
+    return _PathSearch(targets, clearances, base, time).found()
 
 
-class _Search:
+class _PathSearch:
     def __init__(
-        self, targets: Sequence[Target], clearances: Clearances, base: Floats, time: float
+        self, targets: Sequence[PlaceGoal], clearances: Clearances, base: Floats, time: float
     ) -> None:
         self._targets, self._clearances, self._base, self._time = targets, clearances, base, time
 
@@ -79,7 +79,7 @@ class _Search:
         wide = self._clearances.checker(self._robots()).free(states[free], self._time)
         return states[free][np.argsort(~wide, kind="stable")][:ENDS]
 
-    def _alone(self, target: Target) -> Floats:
+    def _alone(self, target: PlaceGoal) -> Floats:
         """Return postures in which a robot touches nothing but what moves, too, (n, d).
 
         Raises:
@@ -98,7 +98,7 @@ class _Search:
             )
         return free[:CANDIDATES]
 
-    def _clear(self, target: Target, postures: Floats) -> Floats:
+    def _clear(self, target: PlaceGoal, postures: Floats) -> Floats:
         """Return those of a robot's postures that are free; first what keeps the clearance."""
         besides, states = self._besides(target), self._with(target, postures)
         free = self._clearances.overlaps(besides).free(states, self._time)
@@ -134,7 +134,7 @@ class _Search:
         choice = extended(())
         return self._states(postures, [] if choice is None else [choice])
 
-    def _more(self, target: Target) -> Floats:
+    def _more(self, target: PlaceGoal) -> Floats:
         others = target.others()
         if sum(other.robot == target.robot for other in self._targets) > 1:
             return others
@@ -159,7 +159,7 @@ class _Search:
             states[:, target.moving] = postures[i][[choice[i] for choice in chosen]]
         return states
 
-    def _with(self, target: Target, postures: Floats) -> Floats:
+    def _with(self, target: PlaceGoal, postures: Floats) -> Floats:
         states = np.tile(self._base, (len(postures), 1))
         states[:, target.moving] = postures
         return states
@@ -172,7 +172,7 @@ class _Search:
         moving = {target.robot for target in self._targets}
         return tuple(name for name in self._clearances.cell.robots if name in moving)
 
-    def _besides(self, target: Target) -> list[str]:
+    def _besides(self, target: PlaceGoal) -> list[str]:
         """Return the robots that move besides a target's."""
         return [other.robot for other in self._targets if other.robot != target.robot]
 
@@ -211,7 +211,7 @@ class Query:
 
     cell: Cell
     start: Floats
-    targets: tuple[Target, ...]
+    targets: tuple[PlaceGoal, ...]
     dynamic_obstacles: CellTrajectory
     clearances: Clearances
     speeds: Floats
@@ -265,7 +265,7 @@ class Query:
         self.clearances.relax(ends[0], end)
         return ends
 
-    def _reachable(self, target: Target) -> Target:
+    def _reachable(self, target: PlaceGoal) -> PlaceGoal:
         """Return a target without the postures that are cut off.
 
         Raises:

@@ -86,7 +86,7 @@ def _rrt_connect(
     resolution: Resolution,
 ) -> Floats | None:
     base, geometric, util = import_ompl()
-    util.RNG.setSeed(seed + 1)  # 0 is none
+    util.RNG.setSeed(seed + 1)  # OMPL takes 0 as no seed
     size = len(start)
     states = _state_space(base, space, [start, *goals])
     info = base.SpaceInformation(states)

@@ -16,7 +16,7 @@ from robot_layouts.motion.timing.velocities import STEP
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class JointTrajectory:
     """Some coordinates of a cell over time; they stand still before and behind.
 
     Attributes:
@@ -36,7 +36,7 @@ class Trajectory:
         """When it ends (s)."""
         return float(self.times[-1])
 
-    def later(self, delay: float) -> Trajectory:
+    def later(self, delay: float) -> JointTrajectory:
         """Return the same, some time later (s)."""
         return replace(self, times=self.times + delay)
 
@@ -53,7 +53,7 @@ class CellTrajectory:
 
     cell: Cell
     base: Floats
-    trajectories: tuple[Trajectory, ...] = ()
+    trajectories: tuple[JointTrajectory, ...] = ()
 
     @property
     def end(self) -> float:
@@ -61,7 +61,7 @@ class CellTrajectory:
         tracks = [o.pose.times[-1] for o in self.cell.obstacles if isinstance(o.pose, Track)]
         return float(max([0.0, *tracks, *(trajectory.end for trajectory in self.trajectories)]))
 
-    def with_trajectory(self, trajectory: Trajectory) -> CellTrajectory:
+    def with_trajectory(self, trajectory: JointTrajectory) -> CellTrajectory:
         """Return the same with another trajectory."""
         return replace(self, trajectories=(*self.trajectories, trajectory))
 

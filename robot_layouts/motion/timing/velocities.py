@@ -23,7 +23,7 @@ from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 
 CONTROL_FREQUENCY = 20.0  # Hz; what tasks use unless they say otherwise
-FASTEST = {"rad": 2.0, "m": 0.5}  # per s; of joints for which nobody says so
+FASTEST = {"rad": 2.0, "m": 0.5}  # per s; of joints for which no limit is given
 TO_FULL_SPEED = 0.4  # s; how long a joint takes to it, unless accelerations are given
 STEP = 0.02  # s; between knots
 
@@ -52,7 +52,7 @@ def largest_velocities(
         frequency: Of control steps (Hz).
 
     Raises:
-        MotionError: If the factor or the frequency makes no sense.
+        MotionError: If the factor or the frequency is invalid.
         UnknownNameError: If there is no such arm or control mode.
     """
     factor = checked_number("velocity", factor, 1e-3, 1.0, MotionError)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
-from robot_layouts.kinematics.solve import Goal, approach, shortfalls
+from robot_layouts.kinematics.solve import IkGoal, approach, shortfalls
 from robots import JointGroup, RobotDescriptor
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
@@ -20,7 +20,7 @@ _LONGEST = 0.5  # way of a joint in a round (rad, m)
 _STRIDE = 0.1  # way of the TCP in a round (m), until one brings it no nearer
 _SHORTER = 0.3  # times that ever after
 _NEAR_ENOUGH = 1e-4  # m; where the place is had, or no stride brings the TCP nearer
-_GAIN = 1e-5, 1e-4  # m, rad; less is none
+_GAIN = 1e-5, 1e-4  # m, rad; less counts as no gain
 _BEYOND = 1e-3  # a limit, that a joint may be sent (rad, m)
 
 
@@ -63,7 +63,7 @@ class ApproximateArm:
         joints = qpos
         root = self._tree.forward(joints[None])[0, self._root]
         wanted = root @ pose_matrix(pose[:3], pose[3:])
-        goal = Goal(wanted[:3, 3], self._links, wanted[:3, :3], self._turned, self._offset)
+        goal = IkGoal(wanted[:3, 3], self._links, wanted[:3, :3], self._turned, self._offset)
         best, stride = self._misses(goal, joints), _STRIDE
         for _ in range(_ROUNDS):
             near = self._on_the_way(goal, joints, stride)
@@ -77,7 +77,7 @@ class ApproximateArm:
                 stride *= _SHORTER
         return joints[self._free], best
 
-    def _on_the_way(self, goal: Goal, joints: Floats, stride: float) -> Goal:
+    def _on_the_way(self, goal: IkGoal, joints: Floats, stride: float) -> IkGoal:
         """Return a goal whose place is at most a stride from where the TCP is."""
         poses = self._tree.forward(joints[None])[0]
         here = poses[self._links, :3, 3].mean(axis=0) + poses[self._turned, :3, :3] @ self._offset
@@ -85,7 +85,7 @@ class ApproximateArm:
         length = float(np.linalg.norm(way))
         return goal if length <= stride else replace(goal, position=here + way * (stride / length))
 
-    def _misses(self, goal: Goal, joints: Floats) -> tuple[float, float]:
+    def _misses(self, goal: IkGoal, joints: Floats) -> tuple[float, float]:
         away, turned_away = shortfalls(self._tree, goal, joints[None])
         return float(away[0]), float(turned_away[0])
 

@@ -34,7 +34,7 @@ class Remembered(NamedTuple):
     size: int
 
 
-class _Driven(NamedTuple):
+class _DrivenGroup(NamedTuple):
     """A joint group: whose it is, and where its numbers and joints are among all."""
 
     robot: str
@@ -151,7 +151,7 @@ class ModeController:
     def shortfalls(self) -> dict[str, Floats]:
         """By arm, how far the last step's joints stay from where it was sent, (N, 2) (m, rad).
 
-        Of arms alone that go as near as they get where a pose cannot be had.
+        Of arms alone that go as near as they get where a pose cannot be reached.
         """
         return {
             control.tool.arm: control.shortfalls
@@ -179,25 +179,25 @@ class ModeController:
         low, high, centre, half = self._scale
         return centre + half * np.minimum(np.maximum(action, low), high)
 
-    def _rows(self, part: _Driven) -> Floats:
+    def _rows(self, part: _DrivenGroup) -> Floats:
         """Return a view of what is remembered of a joint group."""
         if not part.group.asks.tcp:
             return self.targets[:, part.joints.start : part.joints.stop]
         return self._tools[part.robot, part.name].targets
 
 
-def _driven(layout: Layout) -> Iterable[_Driven]:
+def _driven(layout: Layout) -> Iterable[_DrivenGroup]:
     number = joint = 0
     for robot, placement in layout.items():
         own = slice(joint, joint + placement.robot.dof)
         for name, group in placement.robot.action_split.groups.items():
             numbers = slice(number, number + group.size)
             joints = range(joint, joint + len(group.joints))
-            yield _Driven(robot, name, group, numbers, joints, own)
+            yield _DrivenGroup(robot, name, group, numbers, joints, own)
             number, joint = numbers.stop, joints.stop
 
 
-def _scale(driven: Sequence[_Driven]) -> Floats:
+def _scale(driven: Sequence[_DrivenGroup]) -> Floats:
     """Return lowest, highest, centre and half range of every action number, (4, A)."""
     rows: list[tuple[float, float, float, float]] = []
     for part in driven:
@@ -211,7 +211,7 @@ def _scale(driven: Sequence[_Driven]) -> Floats:
     return np.array(rows, np.float32).T
 
 
-def _velocities(driven: Sequence[_Driven]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _velocities(driven: Sequence[_DrivenGroup]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the joints that are driven to velocities, and the action numbers that say to which."""
     joints: list[int] = []
     numbers: list[int] = []
@@ -222,7 +222,7 @@ def _velocities(driven: Sequence[_Driven]) -> tuple[NDArray[np.intp], NDArray[np
     return np.array(joints, np.intp), np.array(numbers, np.intp)
 
 
-def _tcp_group(part: _Driven, layout: Layout, arm: str) -> TcpGroup:
+def _tcp_group(part: _DrivenGroup, layout: Layout, arm: str) -> TcpGroup:
     body, limb = layout[part.robot].robot, layout.arm(arm).robot
     joints = slice(part.joints.start, part.joints.stop)
     return TcpGroup(part.robot, arm, part.group, body, limb, part.numbers, joints, part.own)

@@ -25,7 +25,7 @@ from sapien.render import (
 
 from robot_layouts.simulation.sapien3.visuals import drawn_shapes, stretch
 from robot_layouts.simulation.sapien3.world import BuiltWorld
-from robot_layouts.simulation.scene.looks import Glow, Looks, Paint, Pattern, Shift
+from robot_layouts.simulation.scene.looks import CameraOffset, Glow, Looks, Paint, Pattern
 from robot_layouts.simulation.scene.parts import Part
 from robot_layouts.simulation.scene.shapes import Shape
 from robots.descriptor import Vector3
@@ -117,7 +117,7 @@ def light_color(color: Vector3, glow: Glow) -> list[float]:
 # -- cameras -------------------------------------------------------------------------------------
 
 
-def shifted(pose: sapien.Pose, shift: Shift) -> sapien.Pose:
+def shifted(pose: sapien.Pose, shift: CameraOffset) -> sapien.Pose:
     """Return where a camera is, off its place."""
     roll, pitch, yaw = shift.rotation
     turn = sapien.Pose(list(shift.position))
@@ -128,7 +128,7 @@ def shifted(pose: sapien.Pose, shift: Shift) -> sapien.Pose:
     return pose * turn
 
 
-def widened(fov: float, shift: Shift) -> float:
+def widened(fov: float, shift: CameraOffset) -> float:
     """Return a camera's field of view (rad), which stays below a half-turn."""
     return min(fov * shift.fov, pi - 1e-3)
 

@@ -30,8 +30,7 @@ from robot_layouts.simulation.sapien3.contacts import (
     presses_on_object,
 )
 from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
-from robot_layouts.simulation.sapien3.varied import vary
-from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world
+from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world, vary
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.world import Placements, World
@@ -207,7 +206,7 @@ class SapienBackend:
     def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
         """Return which links of different arms touched since it was last asked; see `Backend`."""
         if self._arms is None:
-            raise SimulationError("nobody looks at which arms touch; call watch_arms() before")
+            raise SimulationError("contacts between arms are not watched; call watch_arms() first")
         return self._arms[self.worlds[env]].take()
 
     def touching(self) -> Flags:

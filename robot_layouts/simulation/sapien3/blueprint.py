@@ -104,8 +104,8 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
         visuals: Whether to read what pictures need.
 
     Raises:
-        AssetError: If its files cannot be found, or make no sense.
-        MissingPackageError: If a mesh cannot be read for want of a package.
+        AssetError: If its files cannot be found, or are invalid.
+        MissingPackageError: If a mesh cannot be read because a package is missing.
         UnknownNameError: If ``allowed_collisions`` or ``no_floor_contact`` names a link that the
             URDF lacks.
     """
@@ -118,7 +118,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
                 f"link in no_floor_contact of {descriptor.name}", link, model.links
             )
     _expect_meshes(model, urdf, visuals=visuals)
-    loader: Any = _Loader()
+    loader: Any = _TextLoader()
     loader.set_scene(sapien.Scene([]))  # which hands out empty builders and is not built in
     loader.fix_root_link = True
     if material := descriptor.gripper_material:
@@ -142,7 +142,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
     return Blueprint(urdf, model, text, builder, overlaps, descriptor.no_floor_contact)
 
 
-class _Loader(URDFLoader):
+class _TextLoader(URDFLoader):
     """A URDF loader that takes text, and finds every mesh that a locator found.
 
     SAPIEN's own drops meshes of a ``package://`` whose folder has another name, saying so only in

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import reduce
+from operator import add
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,8 @@ from robot_layouts.simulation.sapien3.robot import SimulatedRobot
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 
 _Table = dict[tuple[int, int], tuple[int, int]]
+_NOTHING = (0.0, 0.0, 0.0)
+_STILL = np.zeros(3, np.float32)
 
 
 class PairForces:
@@ -36,8 +40,8 @@ class PairForces:
             for pair, impulse in _impulses(contacts(), self._tables[env]).items():
                 if forces is None:
                     forces = np.zeros(self._shape, np.float32)
-                forces[pair, env] = impulse.astype(np.float32) / self._timestep
-        return forces
+                forces[pair, env] = impulse
+        return None if forces is None else forces / self._timestep
 
 
 def _table(world: BuiltWorld, pairs: Sequence[Pair]) -> _Table:
@@ -51,17 +55,20 @@ def _table(world: BuiltWorld, pairs: Sequence[Pair]) -> _Table:
     return table
 
 
-def _impulses(contacts: Sequence[Any], table: _Table) -> dict[int, Any]:
-    """Return the impulse on each link that is touched, (3,) (N·s), by the pair's number."""
-    impulses: dict[int, Any] = {}
+def _impulses(contacts: Sequence[Any], table: _Table) -> dict[int, list[float]]:
+    """Return the impulse on each link that is pressed, (3,) (N·s), by the pair's number."""
+    impulses: dict[int, list[float]] = {}
     for contact in contacts:
         first, second = contact.bodies
         found = table.get((id(first), id(second)))
-        if found is not None:
+        if found is None:
+            continue
+        # As native does: the points of a contact in float32, contacts in float64.
+        total = reduce(add, [point.impulse for point in contact.points], _STILL).tolist()
+        if any(total):  # most are of bodies that are only near
             pair, sign = found
-            # Native adds them up in float64.
-            total = np.sum([point.impulse for point in contact.points], axis=0) * sign
-            impulses[pair] = impulses.get(pair, np.zeros(3)) + total
+            so_far = impulses.get(pair, _NOTHING)
+            impulses[pair] = [a + sign * b for a, b in zip(so_far, total, strict=True)]
     return impulses
 
 

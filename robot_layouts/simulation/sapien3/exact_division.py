@@ -118,7 +118,7 @@ def _write(address: int, data: bytes) -> None:
     """Write instructions.
 
     Raises:
-        SimulationError: If the system lets nobody write there.
+        SimulationError: If the operating system does not allow it.
     """
     start = address // mmap.PAGESIZE * mmap.PAGESIZE
     size = address + len(data) - start

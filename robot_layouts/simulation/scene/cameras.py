@@ -50,7 +50,7 @@ class Camera:
         """Refuse a camera that can take no picture.
 
         Raises:
-            SimulationError: If it looks at where it is, or a size or angle makes no sense.
+            SimulationError: If it looks at where it is, or a size or angle is invalid.
         """
         if not isinstance(self.name, str):
             raise SimulationError(f"a camera's name is {shown(self.name)}; it must be text")

@@ -16,7 +16,7 @@ PATTERNS = ("checker", "stripes", "noise", "wood")
 
 
 @dataclass(frozen=True)
-class Shift:
+class CameraOffset:
     """How a camera is off its place, in its own frame: x is where it looks, y left, z up.
 
     Attributes:
@@ -102,7 +102,7 @@ class Looks:
         patterns: By body.
     """
 
-    cameras: Mapping[str, Shift] = field(default_factory=dict)
+    cameras: Mapping[str, CameraOffset] = field(default_factory=dict)
     lights: Mapping[str, Glow] = field(default_factory=dict)
     paints: Mapping[Part, Paint] = field(default_factory=dict)
     patterns: Mapping[str, Pattern] = field(default_factory=dict)

@@ -118,7 +118,7 @@ def _parse_damaged(xml: bytes, urdf: str) -> tuple[Element, list[str]]:
 
 
 def _with_namespaces(xml: bytes) -> tuple[bytes, list[str]]:
-    """Declare every prefix that an element has and nobody declared."""
+    """Declare every prefix that an element uses without declaring it."""
     used = {match.decode("ascii", "replace") for match in _PREFIX.findall(xml)}
     prefixes = sorted(p for p in used - {"xml", "xmlns"} if f"xmlns:{p}=".encode() not in xml)
     known = {"xacro": "http://www.ros.org/wiki/xacro"}

@@ -136,7 +136,7 @@ def repair_inertia(root: Element, urdf: str) -> Iterator[str]:
     for link in root.iterfind("link"):
         where = f"{urdf}: link {link.get('name', '')!r}"
         if not _is_possible(link, where, moves=link.get("name") in moved):
-            with suppress(AssetError):  # numbers that are none are refused later
+            with suppress(AssetError):  # text that is no number is refused later
                 yield from _repair(link, where, urdf)
 
 

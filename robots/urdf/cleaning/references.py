@@ -122,7 +122,7 @@ def _spellings(reference: str) -> Iterator[str]:
         text = f"package://{text.removeprefix(_GAZEBO)}"
     yield text
     if "://" not in text and not text.startswith("/"):
-        yield f"package://{text}"  # of whoever left out the scheme
+        yield f"package://{text}"  # the scheme may have been left out
     if text.startswith("file://") and not text.startswith("file:///"):
         yield text.removeprefix("file://")
 

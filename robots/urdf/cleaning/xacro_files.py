@@ -51,7 +51,7 @@ def template_of(path: Path) -> tuple[Path, dict[str, str]]:
 
 
 def is_unfinished(root: Element) -> bool:
-    """Tell whether a URDF is a template, of which more is left than definitions nobody uses.
+    """Tell whether a URDF is a template, of which more is left than unused definitions.
 
     Expressions count only beside elements of xacro's: a name may hold a ``${`` of its own.
     """

@@ -1,0 +1,206 @@
+"""Arms with grippers, asked for many grips at once: which are in reach, and in which posture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_layouts.experts.script import Scene
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, rotation_about
+from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
+from robots.gripper_motion import gripper_frame, gripper_motion, link_tree
+from robots.urdf.tcp import find_tcp
+from tasks import TaskEnv
+
+FULL = 6  # joints with which an arm may turn its gripper in any way
+PLACE = 2e-3  # m that a posture may miss
+TURN, ROUGH_TURN = 0.03, 0.35  # rad that it may miss; with fewer joints
+TURN_WORTH = 0.02  # m that a turn by 1 rad is worth to an arm of fewer joints
+FIRST_ITERATIONS, ITERATIONS = 12, 30
+NEAR, NEAR_TURN = 0.1, 0.8  # m and rad from a goal after the first of them
+RANDOM_STARTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class HandPostures:
+    """Postures of a hand.
+
+    Attributes:
+        which: Number of the pose that each was asked for, (k,).
+        qpos: All joints of the robot, (k, dof) (rad, m).
+        turns: Orientation of the gripper's frame that each gives it, (k, 3, 3), world.
+    """
+
+    which: NDArray[np.intp]
+    qpos: Floats
+    turns: Floats
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self.which)
+
+
+class Hand:
+    """An arm and its gripper, wherever it stands.
+
+    Attributes:
+        arm: Its name in the layout.
+        owner: The robot that it belongs to.
+        motion: How its gripper moves.
+        columns: Indices of the arm's joints among the robot's.
+        base: Pose of the robot's base in the world, (4, 4) (m).
+    """
+
+    def __init__(self, task: TaskEnv, arm: str) -> None:
+        """Take an arm of a task.
+
+        Raises:
+            DescriptorError: If it has no fingers.
+            AssetError: If robot files cannot be found.
+        """
+        layout = task.standing()
+        own, self.owner = layout.arm(arm).robot, layout.owner(arm)
+        robot = layout[self.owner].robot
+        self.arm, self.motion, self._own = arm, gripper_motion(own), own
+        self.columns = [robot.joints.index(joint) for joint in own.arm_joints]
+        self._gripper = [robot.joints.index(joint) for joint in self.motion.joints]
+        pose = layout[self.owner].base_pose
+        self.base = pose_matrix(pose.position, pose.quaternion)
+        self._frame = gripper_frame(own)
+        whole = link_tree(robot)
+        self._tree = whole.towards(find_tcp(own, whole).needed)
+        self._tcp = find_tcp(own, self._tree)
+        few = len(self.columns) < FULL
+        self._turn, self._worth = (ROUGH_TURN, TURN_WORTH) if few else (TURN, 1.0)
+        self._random = scattered(self._tree.limits[self.columns], RANDOM_STARTS)
+
+    def qpos(self, scene: Scene) -> Floats:
+        """Return all joints of its robot now, (dof,) (rad, m)."""
+        return scene.qpos(self.owner)
+
+    def share(self, scene: Scene) -> float:
+        """Return how far its gripper is open now, from 0 to 1."""
+        return self.motion.share_at(self.qpos(scene)[self._gripper])
+
+    def joints(self, qpos: Floats) -> Floats:
+        """Return the arm's joints among all of its robot, (…, arm joints) (rad)."""
+        return qpos[..., self.columns]
+
+    def opened(self, qpos: Floats, share: float) -> Floats:
+        """Return postures with the gripper open by a share, (…, dof) (rad, m)."""
+        opened = qpos.copy()
+        opened[..., self._gripper] = self.motion.positions(share)
+        return opened
+
+    def link(self, qpos: Floats) -> Floats:
+        """Return the pose of the TCP link in postures, (k, 4, 4) (m, world)."""
+        return self.base @ self._tree.forward(qpos)[:, self._tcp.turned]
+
+    def turns(self, qpos: Floats) -> Floats:
+        """Return the orientation of the gripper's frame in postures, (k, 3, 3), world."""
+        return self.link(qpos)[:, :3, :3] @ self._frame
+
+    def held(self, scene: Scene, body: str) -> Floats:
+        """Return where a body's origin is in the TCP link's frame, (3,) (m)."""
+        pose = inverse_pose(self.link(self.qpos(scene)[None])[0]) @ pose_matrix(*scene.body(body))
+        return pose[:3, 3]
+
+    def reach(
+        self,
+        places: Floats,
+        turns: Floats,
+        point: Floats,
+        starts: Floats,
+        *,
+        scatter: bool = True,
+        loose: bool = False,
+    ) -> HandPostures:
+        """Return the postures that bring a point of the TCP link to places, for each at most one.
+
+        Args:
+            places: Where the point is to be, (n, 3) (m, world).
+            turns: How the gripper's frame is to be turned there, (n, 3, 3), world.
+            point: In the TCP link's frame, (3,) (m).
+            starts: Postures to begin from, (s, dof) (rad, m); that which comes nearest to the first
+                of them is returned.
+            scatter: Whether to begin from a few random postures as well.
+            loose: Whether the gripper may be turned otherwise by as much as an arm of few joints.
+        """
+        if scatter:
+            more = np.tile(starts[0], (RANDOM_STARTS, 1))
+            more[:, self.columns] = self._random
+            starts = np.concatenate([starts, more])
+        n, s = len(places), len(starts)
+        root = np.linalg.inv(self.base)
+        goal = IkGoal(
+            np.repeat(places @ root[:3, :3].T + root[:3, 3], s, axis=0),
+            (self._tcp.turned,),
+            np.repeat(root[:3, :3] @ turns @ self._frame.T, s, axis=0),
+            self._tcp.turned,
+            point,
+        )
+        qpos = self._descended(goal, np.tile(starts, (n, 1)), TURN_WORTH if loose else self._worth)
+        missing, turned = shortfalls(self._tree, goal, qpos)
+        fits = (missing < PLACE) & (turned < (ROUGH_TURN if loose else self._turn))
+        ways = np.abs(qpos - starts[0])[:, self.columns].max(axis=1)
+        ways = np.where(fits, ways, np.inf).reshape(n, s)
+        which = np.flatnonzero(np.isfinite(ways.min(axis=1)))
+        best = qpos.reshape(n, s, -1)[which, ways.argmin(axis=1)[which]]
+        return HandPostures(which, best, self.turns(best))
+
+    def _descended(self, goal: IkGoal, rows: Floats, worth: float) -> Floats:
+        """Bring rows of postures towards a goal; those that are far from it soon are left there."""
+        qpos = solve(self._tree, goal, rows, self.columns, FIRST_ITERATIONS, worth).qpos
+        missing, turned = shortfalls(self._tree, goal, qpos)
+        near = np.flatnonzero((missing < NEAR) & (turned < NEAR_TURN))
+        if len(near):
+            assert goal.rotation is not None
+            some = replace(goal, position=goal.position[near], rotation=goal.rotation[near])
+            rows = qpos[near]
+            qpos[near] = solve(self._tree, some, rows, self.columns, ITERATIONS, worth).qpos
+        return qpos
+
+    def way(self, one: Floats, other: Floats) -> Floats:
+        """Return how far the joint has to turn that turns farthest, (k,) (rad)."""
+        return np.abs(one - other)[..., self.columns].max(axis=-1)
+
+
+def box_grips(turn: Floats, around: int = 12) -> Floats:
+    """Return how a gripper may be turned to hold a box by two faces, (n, 3, 3), world.
+
+    Args:
+        turn: Orientation of the box, (3, 3), world.
+        around: How many approaches about each way in which the fingers may part.
+    """
+    grips: list[Floats] = []
+    for axis in range(3):
+        for side in (1, -1):
+            opening = side * turn[:, axis]
+            first = turn[:, (axis + 1) % 3]
+            for i in range(around):
+                approach = rotation_about(opening.tolist(), np.array(2 * pi * i / around)) @ first
+                grips.append(np.stack([np.cross(opening, approach), opening, approach], axis=1))
+    return np.array(grips)
+
+
+def offsets(turns: Floats, back: float) -> Floats:
+    """Return how far a gripper's middle lies from what it approaches, (n, 3) (m).
+
+    Args:
+        turns: Orientations of the gripper's frame, (n, 3, 3).
+        back: How far before it (m).
+    """
+    return -back * turns[:, :, 2]
+
+
+def between(one: Floats, other: Floats) -> Floats:
+    """Return the cosine between the approaches of grippers, (…,).
+
+    Args:
+        one: Orientations of one's frame, (…, 3, 3).
+        other: Of the other's, (…, 3, 3).
+    """
+    return (one[..., 2] * other[..., 2]).sum(axis=-1)

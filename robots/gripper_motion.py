@@ -1,0 +1,290 @@
+"""How a gripper moves: where it points, how its fingers part, and how wide it opens.
+
+A gripper's frame has z as its approach and y as the way in which the fingers part, whatever the
+axes of its TCP link.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from robot_layouts.core.errors import DescriptorError
+from robot_layouts.kinematics.rotations import (
+    Floats,
+    inverse_pose,
+    quaternion_of,
+    rotation_of,
+    transform,
+)
+from robot_layouts.kinematics.tree import Tree
+from robots.action_split import JointGroup, is_gripper
+from robots.descriptor import IDENTITY, RobotDescriptor
+from robots.urdf.model import UrdfModel
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
+from robots.urdf.tcp import find_tcp
+from robots.urdf.tree import kinematic_tree
+
+_AXIS_ALIGNED = 0.7  # cosine; a TCP link that is turned less has the gripper's frame
+_SHORT = 1e-4  # m; shorter ways have no direction
+_POSTURES = 9  # of the gripper between its limits, of which the most closed and the next count
+_SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
+_LEAST_WORK = 1e-9  # J; of drives that have no stiffness
+_AJAR = 8  # number of the share at which the pads' way is seen
+
+
+class GripperMotion:
+    """Where the fingers of a robot or a limb are as its gripper opens.
+
+    Each finger's pad is where the TCP lies when the gripper is closed: there fingers meet. How
+    far a gripper is open is given as a share, 0 where the action number -1 drives it, or closes
+    it as far as its joints go, and 1 where the number 1 does.
+
+    Attributes:
+        joints: Names of the gripper's joints.
+        openings: Distance of the two pads at evenly spaced shares from 0 to 1, (65,) (m).
+        turn: Orientation of the gripper's frame in the TCP link's, (3, 3): its y axis is the way in
+            which the pads part at first, whatever `robots.Fingers` says of contact forces.
+    """
+
+    def __init__(self, robot: RobotDescriptor) -> None:
+        """Take a robot or a limb.
+
+        Raises:
+            DescriptorError: If it has no fingers, or no joint group of a gripper.
+            AssetError: If its files cannot be found.
+        """
+        if robot.fingers is None:
+            raise DescriptorError(f"{robot.name} has no fingers")
+        groups = [g for name, g in robot.action_split.groups.items() if is_gripper(name)]
+        groups = [group for group in groups if group.size]
+        if not groups:
+            raise DescriptorError(f"{robot.name} has fingers, but no gripper that is driven")
+        tree = gripper_tree(robot)
+        self.joints = tuple(joint for group in groups for joint in group.joints)
+        places = [robot.joints.index(joint) for joint in self.joints]
+        limits = tree.limits[places]
+        ends = np.concatenate([_ends(group, tree.limits, robot) for group in groups])
+        self._ends = np.clip(ends, limits[:, :1], limits[:, 1:])
+        stiffness = [np.broadcast_to(group.stiffness, len(group.joints)) for group in groups]
+        self._work = float(np.concatenate(stiffness) @ (self._ends[:, 1] - self._ends[:, 0]) ** 2)
+        rows = np.tile(home_of(robot, tree), (len(_SHARES), 1))
+        rows[:, places] = self._positions(_SHARES)
+        poses = tree.forward(rows)
+        tcp = find_tcp(robot, tree)
+        hand = np.linalg.inv(poses[:, tcp.turned])
+        meeting = tcp.places(poses[:1])[0]
+        fingers = [tree.link(link) for link in robot.fingers.links]
+        pads = [inverse_pose(poses[0, finger]) for finger in fingers]
+        one, other = (
+            transform(hand @ poses[:, finger], transform(pad, meeting))
+            for finger, pad in zip(fingers, pads, strict=True)
+        )
+        self._middles = (one + other) / 2
+        self.openings = np.linalg.norm(one - other, axis=1)
+        wrist = transform(hand[0], poses[0, _wrist(robot, tree), :3, 3])
+        self.turn = _axes(self._middles[0] - wrist, (one - other)[_AJAR])
+
+    @property
+    def widest(self) -> float:
+        """How far the pads get apart (m)."""
+        return float(self.openings.max())
+
+    def share(self, opening: float) -> float:
+        """Return the least share at which the pads are so far apart (m); 1 if they never are."""
+        wide = np.flatnonzero(self.openings >= opening)
+        return float(_SHARES[wide[0]]) if len(wide) else float(_SHARES[self.openings.argmax()])
+
+    def slope(self, share: float) -> float:
+        """Return how much wider the gripper opens per share there (m)."""
+        low, high = np.clip((share - 0.05, share + 0.05), 0.0, 1.0)
+        wide = np.interp((low, high), _SHARES, self.openings)
+        return float((wide[1] - wide[0]) / (high - low))
+
+    def pressing(self, force: float, share: float) -> float:
+        """Return by how much of a share a target is more closed that presses with a force (N).
+
+        By virtual work: the forces of the drives along the joints' ways are those of the fingers
+        along theirs.
+        """
+        return force * self.slope(share) / max(self._work, _LEAST_WORK)
+
+    def force(self, step: float, share: float) -> float:
+        """Return the force that a target presses with which is more closed by a length (m) (N)."""
+        return step * self._work / self.slope(share) ** 2
+
+    def share_at(self, positions: Floats) -> float:
+        """Return how far the gripper is open with its joints at some positions (rad, m)."""
+        closed, open_ = self._ends.T
+        return float(np.mean((positions - closed) / (open_ - closed)))
+
+    def positions(self, share: float) -> Floats:
+        """Return the gripper's joints at a share, (joints,) (rad, m)."""
+        return self._positions(np.array([share]))[0]
+
+    def middle(self, share: float) -> Floats:
+        """Return the point between the pads at a share, in the TCP link's frame, (3,) (m)."""
+        columns = [np.interp(share, _SHARES, column) for column in self._middles.T]
+        return np.array(columns)
+
+    def _positions(self, shares: Floats) -> Floats:
+        closed, open_ = self._ends.T
+        return np.asarray(closed + shares[:, None] * (open_ - closed))
+
+
+@lru_cache(maxsize=64)
+def gripper_motion(robot: RobotDescriptor) -> GripperMotion:
+    """Return how the gripper of a robot or a limb moves; see `GripperMotion` for errors."""
+    return GripperMotion(robot)
+
+
+def _ends(group: JointGroup, limits: Floats, robot: RobotDescriptor) -> Floats:
+    """Return where each joint of a group is when closed and when open, (joints, 2) (rad, m)."""
+    own = limits[[robot.joints.index(joint) for joint in group.joints]]
+    if group.delta or group.target or group.command != "position":
+        return own
+    ranges = np.array(group.ranges, float)
+    ranges = np.repeat(ranges, len(group.joints), axis=0) if group.mimic else ranges
+    shares, offsets = np.array(group.followers).T
+    return ranges * shares[:, None] + offsets[:, None]
+
+
+@lru_cache(maxsize=64)
+def gripper_turn(robot: RobotDescriptor) -> Floats | None:
+    """Return what turns the TCP link into the gripper's frame, wxyz.
+
+    None if the TCP link has that frame itself, or nothing says how the gripper opens.
+
+    Args:
+        robot: Whose gripper.
+
+    Raises:
+        AssetError: If its files cannot be found.
+    """
+    if not robot.tcp_position_links:
+        return _turn_of_fingers(robot)
+    tree, qpos = gripper_tree(robot), np.array(robot.keyframe(robot.home.keyframe), float)
+    places = [
+        robot.joints.index(joint)
+        for name, group in robot.action_split.groups.items()
+        if is_gripper(name)
+        for joint in group.joints
+    ]
+    low, high = tree.limits[places].T
+    postures: list[Floats] = []
+    for share in np.linspace(0, 1, _POSTURES):
+        qpos[places] = low + share * (high - low)
+        postures.append(tips(tree, robot, qpos))
+    shut, ajar, *_ = sorted(postures, key=_gap)
+    return _turn_to(shut.mean(0), ajar[-1] - ajar[0])
+
+
+def gripper_frame(robot: RobotDescriptor) -> Floats:
+    """Return the orientation of the gripper's frame in the TCP link's, (3, 3)."""
+    try:
+        return gripper_motion(robot).turn
+    except DescriptorError:
+        turned = gripper_turn(robot)
+        return rotation_of(IDENTITY if turned is None else turned)
+
+
+def _wrist(robot: RobotDescriptor, tree: Tree) -> int:
+    """Return the link that the last joint of the arm moves."""
+    arm = [joint.child for joint in _model(robot).ordered if joint.name in robot.arm_joints]
+    return max(map(tree.link, arm), key=lambda at: len(tree.path(at)), default=0)
+
+
+def _axes(ahead: Floats, apart: Floats) -> Floats:
+    """Return the frame whose y axis is one way, and whose z axis is nearest to another, (3, 3)."""
+    opening = _unit(apart)
+    if not opening.any():
+        opening = np.array((0.0, 1.0, 0.0))
+    approach = _unit(ahead - ahead @ opening * opening)
+    if not approach.any():
+        approach = _unit(np.cross((1.0, 0.0, 0.0), opening))
+    return np.stack([np.cross(opening, approach), opening, approach], axis=1)
+
+
+def _turn_of_fingers(robot: RobotDescriptor) -> Floats | None:
+    """Return the turn into the frame by which way the fingers open, seen from the wrist."""
+    fingers = robot.fingers
+    if fingers is None or not robot.arm_joints:
+        return None
+    tree = gripper_tree(robot)
+    poses = _poses(tree, np.array(robot.keyframe(robot.home.keyframe), float))
+    tcp, wrist = find_tcp(robot, tree), _wrist(robot, tree)
+    turn = poses[tcp.turned, :3, :3]
+    one, other = (
+        sign * poses[tree.link(link), :3, :3] @ axis
+        for link, sign, axis in zip(
+            fingers.links, fingers.opening_signs, fingers.opening_axes, strict=True
+        )
+    )
+    ahead = (tcp.places(poses[None])[0] - poses[wrist, :3, 3]) @ turn
+    opening = _unit((one - other) @ turn)
+    approach = _unit(ahead - ahead @ opening * opening)
+    if abs(opening[1]) > _AXIS_ALIGNED and approach[2] > _AXIS_ALIGNED:
+        return None
+    return _turn_to(approach, opening * (np.sign(opening.sum()) or 1.0))
+
+
+def _turn_to(approach: Floats, apart: Floats) -> Floats | None:
+    """Return the turn to a frame with an approach and a way in which the fingers part, (4,)."""
+    approach = _unit(approach)
+    opening = _unit(apart - apart @ approach * approach)
+    if not (approach.any() and opening.any()):
+        return None
+    return quaternion_of(np.stack([np.cross(opening, approach), opening, approach], 1))
+
+
+@lru_cache(maxsize=64)
+def link_tree(robot: RobotDescriptor) -> Tree:
+    """Return the tree of a robot's links; its coordinates are the descriptor's joints.
+
+    Raises:
+        AssetError: If its files cannot be found.
+    """
+    return kinematic_tree(_model(robot), robot.joints)
+
+
+@lru_cache(maxsize=64)
+def gripper_tree(robot: RobotDescriptor) -> Tree:
+    """Return the tree of a robot's or a limb's links; joints of others follow its coordinates."""
+    model = _model(robot)
+    others = [j.name for j in model.moving if j.name not in robot.joints and j.mimics is None]
+    return kinematic_tree(model, (*robot.joints, *others))
+
+
+def home_of(robot: RobotDescriptor, tree: Tree) -> Floats:
+    """Return the coordinates of a `gripper_tree` at home, other limbs' at 0 (rad, m)."""
+    qpos = np.array(robot.keyframe(robot.home.keyframe), float)
+    return np.pad(qpos, (0, len(tree.coordinates) - len(qpos)))
+
+
+def tips(tree: Tree, robot: RobotDescriptor, qpos: Floats) -> Floats:
+    """Return the links whose mean is the TCP in the frame of the TCP link, (links, 3) (m)."""
+    poses = _poses(tree, qpos)
+    link = inverse_pose(poses[tree.link(robot.tcp_link)])
+    return np.array([(link @ poses[tree.link(tip)])[:3, 3] for tip in robot.tcp_position_links])
+
+
+def _model(robot: RobotDescriptor) -> UrdfModel:
+    urdf = robot.urdf.locate()
+    return read_model(read_urdf(urdf), urdf.as_posix())
+
+
+def _poses(tree: Tree, qpos: Floats) -> Floats:
+    """Return the poses of a gripper's links; joints of other limbs, at 0, move all of them."""
+    return tree.forward(np.pad(qpos, (0, len(tree.coordinates) - len(qpos)))[None])[0]
+
+
+def _gap(points: Floats) -> float:
+    return float(np.linalg.norm(points[-1] - points[0]))
+
+
+def _unit(vector: Floats) -> Floats:
+    """Return a vector of length 1; of length 0 if it has hardly any."""
+    length = np.linalg.norm(vector)
+    return vector / length if length > _SHORT else np.zeros(3)

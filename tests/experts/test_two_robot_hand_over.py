@@ -1,0 +1,62 @@
+"""The hand-over by any two grippers."""
+
+import numpy as np
+import pytest
+
+import tasks
+from layouts import face_to_face
+from robot_layouts.experts import find_expert
+from robot_layouts.experts.hands import Hand, between, box_grips
+from robot_layouts.kinematics.rotations import rotation_about
+from robots import TaskError
+from tasks.episode import play
+
+TASK = "TwoRobotHandOver-v1"
+expert = find_expert(TASK)
+
+
+def test_two_pandas_hand_over():
+    env = tasks.make(TASK)
+    episode = play(env, 0, expert(env, 0))
+    assert episode.solved
+    assert len(episode.actions) < 150
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("pair", [("so100", "so100"), ("koch", "koch"), ("panda", "so100")])
+def test_small_and_mixed_pairs_hand_over(pair: tuple[str, str]):
+    env = tasks.make(TASK, layout=face_to_face(dict(zip(("left", "right"), pair, strict=True))))
+    assert any(play(env, seed, expert(env, seed)).solved for seed in range(3))
+
+
+def test_a_cube_out_of_reach_is_said_to_be():
+    class Away(tasks.get_task_class(TASK)):
+        cube = tasks.Cube(0.02, spawn=tasks.Area(x=0.0, y=1.5))
+
+    with pytest.raises(TaskError, match="'left' cannot reach the cube"):
+        expert(Away(Away.scenario), 0)
+
+
+def test_a_box_is_held_by_any_two_faces_from_all_sides():
+    turn = rotation_about((0.0, 0.0, 1.0), np.array(0.3))
+    grips = box_grips(turn, around=8)
+    assert grips.shape == (48, 3, 3)
+    assert np.allclose(np.linalg.det(grips), 1.0)
+    faces = np.abs(np.einsum("ij,nj->ni", turn.T, grips[:, :, 1]))
+    assert np.allclose(np.sort(faces, axis=1), (0.0, 0.0, 1.0), atol=1e-12)
+    assert between(grips[0], grips[0]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("robot", ["panda", "so100"])
+def test_postures_bring_the_point_between_the_fingers_where_it_is_to_be(robot: str):
+    env = tasks.make(TASK, layout=face_to_face({"left": robot, "right": robot}))
+    hand, here = Hand(env, "left"), env.state.qpos("left")[0].astype(float)
+    link = hand.link(here[None])[0]
+    point = hand.motion.middle(0.3)
+    place = link[:3, :3] @ point + link[:3, 3]
+    away = here.copy()
+    away[hand.columns] += 0.1
+    found = hand.reach(place[None], hand.turns(here[None]), point, away[None])
+    assert len(found) == 1
+    reached = hand.link(found.qpos)[0]
+    assert np.linalg.norm(reached[:3, :3] @ point + reached[:3, 3] - place) < 2e-3

@@ -1,0 +1,58 @@
+"""How grippers move: openings, the point between the fingers, and the frame."""
+
+import numpy as np
+import pytest
+
+from robots import DescriptorError, RobotDescriptor, RobotRegistry
+from robots.gripper_motion import gripper_motion
+
+
+def load(name: str) -> RobotDescriptor:
+    robot = RobotRegistry.load(name)
+    return next(iter(robot.parts.values())) if robot.limbs else robot
+
+
+@pytest.mark.parametrize(
+    ("name", "widest"),  # m: twice what one finger of each slides; of jaws, their tips when open
+    [("panda", 0.08), ("panda_pinch", 0.12), ("fetch", 0.1), ("so100", 0.1357), ("koch", 0.0774)],
+)
+def test_how_wide_it_opens(name: str, widest: float):
+    motion = gripper_motion(load(name))
+    assert motion.widest == pytest.approx(widest, abs=1e-4)
+    assert motion.openings[0] == pytest.approx(0.0)
+    assert (np.diff(motion.openings) > 0).all()
+
+
+@pytest.mark.parametrize("name", ["panda", "so100", "koch", "baxter"])
+def test_a_share_gives_the_opening_that_was_asked_for(name: str):
+    motion = gripper_motion(load(name))
+    opening = 0.6 * motion.widest
+    share = motion.share(opening)
+    at = np.interp(share, np.linspace(0, 1, len(motion.openings)), motion.openings)
+    assert opening <= at < opening + motion.widest / 50
+    assert motion.share_at(motion.positions(share)) == pytest.approx(share)
+    assert motion.share(2 * motion.widest) == 1.0
+
+
+def test_sliding_fingers_keep_their_middle_and_a_swinging_jaw_moves_it():
+    panda, koch = gripper_motion(load("panda")), gripper_motion(load("koch"))
+    assert np.allclose(panda.middle(0.0), panda.middle(1.0), atol=1e-9)
+    assert np.linalg.norm(koch.middle(1.0) - koch.middle(0.0)) > 0.03
+
+
+def test_the_frame_opens_as_the_pads_part():
+    """A Koch's jaws open along its TCP's x axis; its fingers' axes are native's, which is y."""
+    assert np.allclose(abs(gripper_motion(load("koch")).turn[:, 1]), (1, 0, 0), atol=0.2)
+    assert np.allclose(gripper_motion(load("panda")).turn, np.eye(3), atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["panda", "so100", "koch"])
+def test_force_and_step_are_inverse(name: str):
+    motion = gripper_motion(load(name))
+    force = motion.force(1e-4, 0.5)
+    assert motion.pressing(force, 0.5) * motion.slope(0.5) == pytest.approx(1e-4)
+
+
+def test_without_fingers_there_is_none():
+    with pytest.raises(DescriptorError, match="panda_stick has no fingers"):
+        gripper_motion(load("panda_stick"))

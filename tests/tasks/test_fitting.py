@@ -1,0 +1,75 @@
+"""Tasks that fit their robots: sizes by reach and gripper, places by what arms share."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+import tasks
+from layouts import Layout, face_to_face, side_by_side
+from robots import TaskError
+from tasks.language.fitting import AS_DECLARED, Fit, shared_place
+
+TASK = "TwoRobotHandOver-v1"
+
+
+def two(robot: str, **places: float) -> Layout:
+    return face_to_face({"left": robot, "right": robot}, **places)
+
+
+def test_its_own_robots_keep_every_number():
+    env = tasks.make(TASK)
+    assert env.task.fit is AS_DECLARED
+    assert env.task.cube is env.task_class.cube
+    place, turn = (0.1, 0.2, 0.3), (1.0, 0.0, 0.0, 0.0)
+    assert AS_DECLARED.place(place) is place
+    assert AS_DECLARED.turned(turn) is turn
+    assert AS_DECLARED.length(0.02) == 0.02
+
+
+def test_a_robot_that_reaches_and_holds_as_much_changes_nothing():
+    assert tasks.make(TASK, robots={"right": "panda_wristcam"}).task.fit is AS_DECLARED
+
+
+def test_small_arms_get_a_small_cube_between_them():
+    env = tasks.make(TASK, layout=two("so100"))
+    fit = env.task.fit
+    assert 0.4 < fit.scale < 0.6
+    assert env.task.cube.half_size == pytest.approx(0.02 * fit.scale)
+    assert env.task_class.cube.half_size == 0.02
+    for seed in range(5):
+        env.reset(seed)
+        x, y, z = env.state.position("cube")[0]
+        assert z == pytest.approx(0.02 * fit.scale)
+        assert -0.15 * fit.scale <= y - fit.y <= -0.1 * fit.scale
+        assert abs(x - fit.x) <= 0.05 * fit.scale
+        assert env.state.position("goal_site")[0, 1] > y
+
+
+def test_the_frame_turns_with_the_arms():
+    layout = two("koch").moved((0.0, 0.0, 0.0), yaw=pi / 2)
+    straight, turned = (tasks.make(TASK, layout=a).task.fit for a in (two("koch"), layout))
+    assert turned.yaw - straight.yaw == pytest.approx(pi / 2)
+    assert turned.scale == pytest.approx(straight.scale, rel=0.2)
+
+
+def test_places_are_scaled_then_turned_then_shifted():
+    fit = Fit(2.0, x=1.0, y=-1.0, yaw=pi / 2)
+    assert fit.place((0.1, 0.0, 0.3)) == pytest.approx((1.0, -0.8, 0.6))
+    assert fit.turned((1.0, 0.0, 0.0, 0.0)) == pytest.approx((0.5**0.5, 0.0, 0.0, 0.5**0.5))
+
+
+def test_a_narrow_gripper_gets_what_it_can_hold():
+    env = tasks.make(TASK, layout=side_by_side({"left": "panda", "right": "koch"}, spacing=0.4))
+    assert 2 * env.task.cube.half_size <= 0.75 * 0.0775
+
+
+def test_arms_that_share_nothing_are_refused():
+    with pytest.raises(TaskError, match=r"no place .* in reach of all of 'left' \(so100\)"):
+        tasks.make(TASK, layout=two("so100", spacing=3.0))
+
+
+def test_the_shared_place_lies_in_the_middle_of_equal_arms():
+    (x, y), depth = shared_place(two("panda", spacing=1.5), ("left", "right"))
+    assert np.hypot(x, y) < 0.05
+    assert 0.05 < depth < 0.3
