@@ -11,26 +11,28 @@ import numpy as np
 from layouts import single
 from layouts.validation.collisions import Postures, fixed, nearest
 from layouts.validation.collisions import stand as stand_hulls
-from robot_layouts.kinematics.rotations import inverse, pose_matrix, quaternion_of, rotate
+from robot_layouts.kinematics.rotations import Floats, inverse, pose_matrix, quaternion_of, rotate
 from robot_layouts.simulation.checks.trial import NAME, RobotAlone
-from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
 from robot_layouts.simulation.scene.shapes import Box
 from robots import RobotDescriptor
 from robots.action_split import is_gripper
 from robots.bodies.hulls import convex_hull, load_model
+from robots.gripper_motion import gripper_motion
 from robots.parts import Fingers
 from robots.urdf.tcp import find_tcp
 
 CUBE = "cube"  # its name in the world
 OFF = 5e-3  # m; a TCP may be so far from where the fingers meet
-LARGEST, SHARE = 0.02, 0.6  # m, and of how far the fingers part: the cube's side
+SIDES, SHARE = (0.02, 0.03), 0.6  # m; and of how far the fingers part: the cube's side
 SLIPS = 0.01  # m; a cube that moves farther in the hand is not held
 
 _SHARES = 33  # postures from one end of the gripper to the other
 _POINT = 1e-4  # m; half the size of the body that stands for a point
-_CLOSING, _HOLDING, _SHAKING = 40, 20, 40  # steps
-_TIGHTER = 2  # steps for which the fingers go on closing once they grasp
+_CLOSING, _HOLDING, _SHAKING = 200, 20, 40  # steps
+_CLOSE, _HOLD = 30.0, 3.0  # N with which fingers close until they feel the cube, and hold it
+_DEEP = 0.1  # of the cube's side: how far it lies from the TCP towards the palm
+_STEP = 2e-4  # m by which they close in a step at least
 _SHAKE, _PERIOD = 0.1, 10  # rad or m to both sides, and steps; 0.5 m away that is some 8 m/s²
 _WEIGHTLESS = replace(SAPIEN_DEFAULTS, gravity=(0.0, 0.0, 0.0))
 
@@ -45,7 +47,7 @@ class GraspTrial(NamedTuple):
             infinite if they are not known or have no shapes.
         side: Of the cube that they were closed on (m); 0 if there was none.
         closed: Whether they grasped it when they had closed.
-        held: Whether they grasped it from then on, at rest and while the arm shook it.
+        held: Whether they still did when the arm had shaken it.
         slipped: How far it moved in the hand meanwhile (m).
     """
 
@@ -88,7 +90,8 @@ class GraspTrial(NamedTuple):
 def try_grasps(robot: RobotDescriptor) -> Iterator[GraspTrial]:
     """Close each gripper of a robot on a cube, hold it, and shake it with the arm's first joint.
 
-    Nothing has weight: the cube floats between the fingers until they have closed.
+    Nothing has weight: the cube floats between the fingers until they have closed. If one cube is
+    lost, a larger one is tried.
 
     Args:
         robot: The robot.
@@ -135,7 +138,8 @@ class _Gripper:
             for body in bodies
         ]
         self._roots = poses[:, [tree.link(link) for link in fingers.links]][..., :3, 3].mean(axis=1)
-        self._rows, self._ends = rows, ends
+        self._rows, self._motion = rows, gripper_motion(self._part)
+        self._gripper = [self._joints.index(joint) for joint in self._motion.joints]
 
     def _at(self, end: int) -> Floats:
         """Return the joints with the gripper's numbers at one end, (dof,) (rad, m)."""
@@ -158,16 +162,18 @@ class _Gripper:
         off = np.linalg.norm(ends - self._tcps[:, None], axis=2).max(axis=1)
         shut, wide = int(gaps.argmin()), int(gaps.argmax())
         seen = seen._replace(tcp_off=float(max(off[shut] - gaps[shut] / 2, 0.0)))
-        side = min(SHARE * float(gaps[wide]), LARGEST)
-        if not (seen.between and side > 0):
-            return seen
         between = range(wide, shut, 1 if shut > wide else -1)
-        fitting = [at for at in between if gaps[at] >= side][-1]
-        goal = self._ends[0 if shut < wide else 1]
-        closed, held, slipped = self._close(
-            self._rows[wide], goal, self._cube(ends[fitting], fitting), side
-        )
-        return seen._replace(side=side, closed=closed, held=held, slipped=slipped)
+        for largest in SIDES:
+            side = min(SHARE * float(gaps[wide]), largest)
+            if not (seen.between and side > 0):
+                return seen
+            fitting = [at for at in between if gaps[at] >= side][-1]
+            open_, cube = self._rows[wide], self._cube(ends[fitting], fitting, side)
+            closed, held, slipped = self._close(open_, cube, side)
+            seen = seen._replace(side=side, closed=closed, held=held, slipped=slipped)
+            if seen.grasps:
+                break
+        return seen
 
     def _near(self, at: int) -> Floats:
         """Return the points of both fingers that are nearest to the TCP, (2, 3) (m)."""
@@ -176,14 +182,17 @@ class _Gripper:
         point = fixed("TCP", convex_hull(0, tcp + corners, "TCP"), 1)
         for pairs in self._pairs:
             approach = nearest(self._posture(at), point, pairs)
-            inside = approach is None or approach.distance <= 0
-            ends.append(tcp if inside else np.array(approach.points[0]))
+            if approach is None or approach.distance <= 0:
+                ends.append(tcp)
+            else:
+                ends.append(np.array(approach.points[0]))
         return np.array(ends)
 
-    def _cube(self, ends: Floats, at: int) -> tuple[Floats, Floats]:
+    def _cube(self, ends: Floats, at: int, side: float) -> tuple[Floats, Floats]:
         """Return place, (3,) (m), and orientation, wxyz, of a cube that lies between the fingers.
 
-        It is turned as they part and as they point.
+        It is turned as they part and as they point, and lies a little nearer to the palm than the
+        TCP, which may be at the very end of the fingers.
         """
         one, other = ends
         apart = (one - other) / np.linalg.norm(one - other)
@@ -193,7 +202,7 @@ class _Gripper:
             ahead = np.cross(apart, np.eye(3)[np.abs(apart).argmin()])
         ahead /= np.linalg.norm(ahead)
         turn = np.stack([np.cross(apart, ahead), apart, ahead], axis=1)
-        return ends.mean(axis=0), quaternion_of(turn)
+        return ends.mean(axis=0) - _DEEP * side * ahead, quaternion_of(turn)
 
     def _posture(self, at: int) -> Postures:
         hulls = self._hulls
@@ -207,31 +216,41 @@ class _Gripper:
         )
 
     def _close(
-        self, open_: Floats, goal: Floats, cube: tuple[Floats, Floats], side: float
+        self, open_: Floats, cube: tuple[Floats, Floats], side: float
     ) -> tuple[bool, bool, float]:
         """Close on a cube; return whether it is grasped, stays so, and how far it slips (m)."""
-        alone = RobotAlone(self._layout, (CUBE, Box((side / 2,) * 3)), physics=_WEIGHTLESS)
+        alone = RobotAlone(
+            self._layout, (CUBE, Box((side / 2, side / 2, side / 2))), physics=_WEIGHTLESS
+        )
         world = alone.simulation.worlds[0]
         world.stand(NAME, open_)
         world.set_pose(CUBE, *cube)
-        target, way, left = open_, (goal - open_) / _CLOSING, _TIGHTER
+        target = open_.copy()
         for _ in range(_CLOSING):
-            if left > 0:
-                target = target + way
+            target[self._gripper] = self._pressed(alone, side)
             alone.step(alone.numbers_for(target))
-            left -= self._grasps(alone)
         closed, place = self._grasps(alone), self._in_hand(alone)
-        held, slipped = closed, 0.0
+        slipped, grasped = 0.0, list[bool]()
         arm = [joint for joint in self._part.joints if joint in self._part.arm_joints][:1]
         for step in range(_HOLDING + _SHAKING):
+            target[self._gripper] = self._pressed(alone, side)
             shaken = target.copy()
             for joint in arm:
                 turns = max(step - _HOLDING, 0) / _PERIOD
                 shaken[self._joints.index(joint)] += _SHAKE * np.sin(2 * np.pi * turns)
             alone.step(alone.numbers_for(shaken))
-            held = held and self._grasps(alone)
+            grasped.append(self._grasps(alone))
             slipped = max(slipped, float(np.linalg.norm(self._in_hand(alone) - place)))
+        held = closed and any(grasped[-_PERIOD:])
         return closed, held, slipped if np.isfinite(slipped) else np.inf
+
+    def _pressed(self, alone: RobotAlone, side: float) -> Floats:
+        """Return where the gripper's joints are to go: to close, or to hold what they grasp."""
+        now = alone.simulation.read().qpos(NAME)[0].astype(float)[self._gripper]
+        share = self._motion.share_at(now)
+        closing = max(_CLOSE, self._motion.force(_STEP, self._motion.share(side)))
+        force = _HOLD if self._grasps(alone) else closing
+        return self._motion.positions(share - self._motion.pressing(force, share))
 
     def _grasps(self, alone: RobotAlone) -> bool:
         return bool(alone.simulation.read().is_grasping(self._arm, CUBE)[0])
