@@ -25,6 +25,8 @@ _TEST = '''"""Tests whether {name} stands and moves as it should; run it with py
 
 from layouts import single
 from robots import RobotRegistry
+from robot_layouts.simulation.checks.grasp import try_grasps
+from robot_layouts.simulation.checks.tcp_control import try_tcp_control
 from robot_layouts.simulation.checks.trial import try_robot
 from {module} import {constant}
 
@@ -40,6 +42,15 @@ def test_nothing_collides_where_it_stands():
 
 def test_every_action_number_moves_its_own_joints():
     assert not try_robot({constant}).problems
+
+
+def test_its_tcp_goes_where_it_is_sent():
+    if {constant}.arm_joints:
+        assert [seen.problem for seen in try_tcp_control({constant}) if seen.problem] == []
+
+
+def test_its_fingers_meet_at_the_tcp_and_hold_a_cube():
+    assert [seen.problem for seen in try_grasps({constant}) if seen.problem] == []
 '''
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 import sys
 
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from layouts.__main__ import main as layouts
 from robots.named import named_robot
 from robots.new_robot import main
-from robots.registry import ROBOTS
+from robots.registry import ROBOTS, RobotRegistry
 from tests.robots.urdf_parts import Parts
 
 
@@ -50,3 +51,13 @@ def test_its_name_is_enough_on_a_command_line(folder, capsys):
     ROBOTS.registered.clear()
     assert layouts(["show", "cell.yaml", "right=made:MADE"]) == 0
     assert capsys.readouterr().out.count("right  made") == 2
+
+
+def test_the_tests_that_it_writes_pass(folder):
+    shutil.copytree(RobotRegistry.load("panda").urdf.locate().parent, folder / "panda")
+    (urdf,) = (folder / "panda").glob("panda_v2.urdf")
+    assert main([str(urdf), "--name", "made", "--folder", str(folder)]) == 0
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_made.py"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    assert "5 passed" in done.stdout

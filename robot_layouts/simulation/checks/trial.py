@@ -16,7 +16,8 @@ from layouts import Layout, single
 from robot_layouts.simulation.backend import Overlap, Part
 from robot_layouts.simulation.checks.overlaps import empty, stand, starting_overlaps
 from robot_layouts.simulation.maths import Array, Floats
-from robot_layouts.simulation.scene.shapes import Plane
+from robot_layouts.simulation.physics import PhysicsSettings
+from robot_layouts.simulation.scene.shapes import Plane, Shape
 from robot_layouts.simulation.simulation import Simulation
 from robot_layouts.simulation.world import World
 from robots import ActionNumber, RobotDescriptor
@@ -252,13 +253,22 @@ class RobotAlone:
         simulation: The world.
     """
 
-    def __init__(self, layout: Layout) -> None:
-        """Stand the robot of a layout in a world."""
+    def __init__(
+        self, layout: Layout, *bodies: tuple[str, Shape], physics: PhysicsSettings | None = None
+    ) -> None:
+        """Stand the robot of a layout in a world, with other bodies, by name, that move freely."""
         self.layout = layout
         self.robot, self.start = layout[NAME].robot, layout[NAME].start_qpos
         base = layout[NAME].base_position[2]
-        self.build = adds_floor(base) if drives_on_floor(self.robot) else empty
-        self.simulation = Simulation(layout, self.build, 1)
+        floor = adds_floor(base) if drives_on_floor(self.robot) else empty
+
+        def build(world: World, number: int) -> None:
+            floor(world, number)
+            for name, shape in bodies:
+                world.add(name, shape)
+
+        self.build = build
+        self.simulation = Simulation(layout, self.build, 1, physics)
         self._limits = self.simulation.index.robots[NAME].speeds
         stand(self.simulation)
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from robot_layouts.core.cli import File, Word
 from robot_layouts.core.errors import DescriptorError
+from robot_layouts.simulation.checks.grasp import GraspTrial, try_grasps
+from robot_layouts.simulation.checks.tcp_control import TcpTrial, try_tcp_control
 from robot_layouts.simulation.checks.trial import (
     HELD,
     Fastest,
@@ -16,6 +18,7 @@ from robot_layouts.simulation.checks.trial import (
     percent,
     try_robot,
 )
+from robots import RobotDescriptor
 from robots import inspect as reports
 from robots.named import FORMS, guessed_robot, is_path, named_robot
 from robots.picture import save_picture
@@ -44,7 +47,8 @@ def inspect(
         picture: Save a picture of the robot (.png, .pdf, .svg): its limbs at rest, its front, its
             TCP, its gripper open and closed, what to change if something is wrong, and what was
             guessed with doubt.
-        try_: Stand the robots, step them and move them in physics, and print what was seen.
+        try_: Stand the robots, step them, move them and their TCPs, and close their grippers on a
+            cube in physics, and print what was seen.
 
     Raises:
         RobotLayoutsError: If a robot does not exist, or cannot be read, drawn or built.
@@ -66,23 +70,27 @@ def inspect(
 
     console = Console(markup=False, highlight=False, soft_wrap=True)
     console.width = max(console.width, WIDTH)
-    trials: list[Trial] = []
-    for robot in [named_robot(name) for name in robots]:
-        trials.append(try_robot(robot, STEPS))
-        _print(trials[-1], console)
-    return 1 if any(trial.problems for trial in trials) else 0
+    problems = [_try(robot, console) for robot in [named_robot(name) for name in robots]]
+    return 1 if any(problems) else 0
 
 
-def _print(trial: Trial, console: Console) -> None:
+def _try(robot: RobotDescriptor, console: Console) -> tuple[str, ...]:
+    """Try a robot, print what was seen, and return what is wrong."""
+    trial, grasps = try_robot(robot, STEPS), tuple(try_grasps(robot))
+    steers = robot.arm_joints and not trial.problems
+    tcps = tuple(try_tcp_control(robot)) if steers else ()
+    more = [one.problem for one in (*grasps, *tcps) if one.problem is not None]
+    problems = (*trial.problems, *more)
     console.print(f"{trial.robot.name}: {trial.robot.summary}")
-    for line in _lines(trial):
+    for line in (*_lines(trial), *map(_grasp, grasps), *map(_tcp_control, tcps)):
         console.print(f"  {line}")
     console.print(_numbers(trial))
-    if not trial.problems:
+    if not problems:
         console.print("  It stands and moves as it should.")
-    for problem in trial.problems:
+    for problem in problems:
         console.print(f"  WRONG: {problem}")
     console.print()
+    return problems
 
 
 def _lines(trial: Trial) -> Iterator[str]:
@@ -93,6 +101,23 @@ def _lines(trial: Trial) -> Iterator[str]:
     yield f"after {HELD} steps  {joint} is fastest: {_amount(trial, joint, amount)}/s"
     yield f"random actions  {trial.steps} steps; fastest {_speed(trial, trial.fastest)}"
     yield f"TCP             {trial.robot.tcp_link}, moved by up to {trial.tcp_way * 1e3:.3g} mm"
+
+
+def _grasp(seen: GraspTrial) -> str:
+    if seen.fingers is None:
+        return f"grasp           {seen.arm}: its fingers are not known"
+    off = f"{seen.tcp_off * 1e3:.3g} mm from where {' and '.join(seen.fingers)} meet"
+    holds = "grasps and holds" if seen.grasps else "does not hold"
+    return f"grasp           {seen.arm}: TCP {off}; {holds} a cube of {seen.side * 1e3:.3g} mm"
+
+
+def _tcp_control(seen: TcpTrial) -> str:
+    lengths = seen.drift, seen.corner, seen.reported
+    drift, corner, reported = (f"{length * 1e3:.2g} mm" for length in lengths)
+    return (
+        f"{seen.mode}  {seen.arm}: moves by {drift} while held, and misses a corner of a square by"
+        f" {corner} (reported: {reported})"
+    )
 
 
 def _overlaps(trial: Trial) -> str:

@@ -1,0 +1,262 @@
+"""Tries grippers: whether the TCP is where the fingers meet, and whether they hold a cube."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from layouts import single
+from layouts.validation.collisions import Postures, fixed, nearest
+from layouts.validation.collisions import stand as stand_hulls
+from robot_layouts.kinematics.rotations import Floats, inverse, pose_matrix, quaternion_of, rotate
+from robot_layouts.simulation.checks.trial import NAME, RobotAlone
+from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
+from robot_layouts.simulation.scene.shapes import Box
+from robots import RobotDescriptor
+from robots.action_split import is_gripper
+from robots.bodies.hulls import convex_hull, load_model
+from robots.gripper_motion import gripper_motion
+from robots.parts import Fingers
+from robots.urdf.tcp import find_tcp
+
+CUBE = "cube"  # its name in the world
+OFF = 5e-3  # m; a TCP may be so far from where the fingers meet
+SIDES, SHARE = (0.02, 0.03), 0.6  # m; and of how far the fingers part: the cube's side
+SLIPS = 0.01  # m; a cube that moves farther in the hand is not held
+
+_SHARES = 33  # postures from one end of the gripper to the other
+_POINT = 1e-4  # m; half the size of the body that stands for a point
+_CLOSING, _HOLDING, _SHAKING = 200, 20, 40  # steps
+_CLOSE, _HOLD = 30.0, 3.0  # N with which fingers close until they feel the cube, and hold it
+_DEEP = 0.1  # of the cube's side: how far it lies from the TCP towards the palm
+_STEP = 2e-4  # m by which they close in a step at least
+_SHAKE, _PERIOD = 0.1, 10  # rad or m to both sides, and steps; 0.5 m away that is some 8 m/s²
+_WEIGHTLESS = replace(SAPIEN_DEFAULTS, gravity=(0.0, 0.0, 0.0))
+
+
+class GraspTrial(NamedTuple):
+    """What was seen of a gripper.
+
+    Attributes:
+        arm: The robot, or the limb, by its name in the layout.
+        fingers: The two links that grasp; None if they are not known.
+        tcp_off: How far the TCP is from where they meet (m), 0 between them or in their surfaces;
+            infinite if they are not known or have no shapes.
+        side: Of the cube that they were closed on (m); 0 if there was none.
+        closed: Whether they grasped it when they had closed.
+        held: Whether they still did when the arm had shaken it.
+        slipped: How far it moved in the hand meanwhile (m).
+    """
+
+    arm: str
+    fingers: tuple[str, str] | None
+    tcp_off: float = np.inf
+    side: float = 0.0
+    closed: bool = False
+    held: bool = False
+    slipped: float = np.inf
+
+    @property
+    def between(self) -> bool:
+        """Whether the TCP is where the fingers meet."""
+        return self.tcp_off < OFF
+
+    @property
+    def grasps(self) -> bool:
+        """Whether a cube stays in the hand."""
+        return self.held and self.slipped < SLIPS
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong, or None."""
+        if self.fingers is None:
+            return f"the fingers of {self.arm} are not known, so that its grasps go unnoticed"
+        pair, side = " and ".join(self.fingers), f"a cube of {self.side * 1e3:.3g} mm"
+        if not self.between:
+            off = f"{self.tcp_off * 1e3:.3g} mm"
+            return f"the TCP of {self.arm} is {off} from where {pair} meet"
+        if self.side == 0:
+            return f"{pair} do not part at the TCP of {self.arm}, so that nothing fits between them"
+        if not self.closed:
+            return f"{pair} close on {side} without grasping it"
+        if not self.grasps:
+            return f"{pair} grasp {side}, and lose it when the arm shakes it"
+        return None
+
+
+def try_grasps(robot: RobotDescriptor) -> Iterator[GraspTrial]:
+    """Close each gripper of a robot on a cube, hold it, and shake it with the arm's first joint.
+
+    Nothing has weight: the cube floats between the fingers until they have closed. If one cube is
+    lost, a larger one is tried.
+
+    Args:
+        robot: The robot.
+
+    Yields:
+        What was seen of each gripper that is driven; nothing of a robot without one.
+
+    Raises:
+        RobotLayoutsError: If it cannot be built.
+    """
+    layout = single({NAME: robot})
+    for arm in layout.places.values():
+        part = layout.arm(arm).robot
+        groups = part.action_split.groups
+        if not any(is_gripper(name) and group.size for name, group in groups.items()):
+            continue
+        if part.fingers is None:
+            yield GraspTrial(arm, None)
+        else:
+            yield _Gripper(robot, arm, part.fingers).trial()
+
+
+class _Gripper:
+    """A gripper of a robot alone, at places between its two ends, of which the first is closed."""
+
+    def __init__(self, robot: RobotDescriptor, arm: str, fingers: Fingers) -> None:
+        layout = single({NAME: robot}).in_control_mode("pd_joint_pos")
+        placement, self._part = layout[NAME], layout.arm(arm).robot
+        self._layout, self._arm, self._fingers = layout, arm, fingers
+        self._start = np.array(placement.start_qpos)
+        model = load_model(placement.robot)
+        tree = model.kinematics
+        self._joints = placement.robot.joints
+        ends = np.array([self._at(0), self._at(1)])
+        shares = np.linspace(0, 1, _SHARES)[:, None]
+        rows = (ends[0] + shares * (ends[1] - ends[0])).clip(*tree.limits.T)
+        self._hulls = stand_hulls(NAME, placement.base_pose, model, rows)
+        base = placement.base_pose
+        poses = pose_matrix(base.position, base.quaternion) @ tree.forward(rows)
+        self._tcps = find_tcp(self._part, tree).places(poses)
+        bodies = [tree.bodies[tree.link(link)] for link in fingers.links]
+        self._pairs = [
+            [(i, 0) for i, hull in enumerate(model.hulls) if tree.bodies[hull.link] == body]
+            for body in bodies
+        ]
+        self._roots = poses[:, [tree.link(link) for link in fingers.links]][..., :3, 3].mean(axis=1)
+        self._rows, self._motion = rows, gripper_motion(self._part)
+        self._gripper = [self._joints.index(joint) for joint in self._motion.joints]
+
+    def _at(self, end: int) -> Floats:
+        """Return the joints with the gripper's numbers at one end, (dof,) (rad, m)."""
+        qpos = self._start.copy()
+        for name, group in self._part.action_split.groups.items():
+            if is_gripper(name):
+                for i, joint in enumerate(group.joints):
+                    value = group.ranges[0 if group.mimic else i][end]
+                    times, plus = group.followers[i] if group.mimic else (1.0, 0.0)
+                    qpos[self._joints.index(joint)] = times * value + plus
+        return qpos
+
+    def trial(self) -> GraspTrial:
+        """Compare TCP and fingers, and close them on a cube."""
+        seen = GraspTrial(self._arm, self._fingers.links)
+        if not all(self._pairs):
+            return seen
+        ends = np.array([self._near(at) for at in range(_SHARES)])
+        gaps = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+        off = np.linalg.norm(ends - self._tcps[:, None], axis=2).max(axis=1)
+        shut, wide = int(gaps.argmin()), int(gaps.argmax())
+        seen = seen._replace(tcp_off=float(max(off[shut] - gaps[shut] / 2, 0.0)))
+        between = range(wide, shut, 1 if shut > wide else -1)
+        for largest in SIDES:
+            side = min(SHARE * float(gaps[wide]), largest)
+            if not (seen.between and side > 0):
+                return seen
+            fitting = [at for at in between if gaps[at] >= side][-1]
+            open_, cube = self._rows[wide], self._cube(ends[fitting], fitting, side)
+            closed, held, slipped = self._close(open_, cube, side)
+            seen = seen._replace(side=side, closed=closed, held=held, slipped=slipped)
+            if seen.grasps:
+                break
+        return seen
+
+    def _near(self, at: int) -> Floats:
+        """Return the points of both fingers that are nearest to the TCP, (2, 3) (m)."""
+        tcp, ends = self._tcps[at], list[Floats]()
+        corners = np.array(np.meshgrid(*[(-_POINT, _POINT)] * 3)).reshape(3, -1).T
+        point = fixed("TCP", convex_hull(0, tcp + corners, "TCP"), 1)
+        for pairs in self._pairs:
+            approach = nearest(self._posture(at), point, pairs)
+            if approach is None or approach.distance <= 0:
+                ends.append(tcp)
+            else:
+                ends.append(np.array(approach.points[0]))
+        return np.array(ends)
+
+    def _cube(self, ends: Floats, at: int, side: float) -> tuple[Floats, Floats]:
+        """Return place, (3,) (m), and orientation, wxyz, of a cube that lies between the fingers.
+
+        It is turned as they part and as they point, and lies a little nearer to the palm than the
+        TCP, which may be at the very end of the fingers.
+        """
+        one, other = ends
+        apart = (one - other) / np.linalg.norm(one - other)
+        ahead = ends.mean(axis=0) - self._roots[at]
+        ahead -= ahead @ apart * apart
+        if not np.linalg.norm(ahead) > _POINT:
+            ahead = np.cross(apart, np.eye(3)[np.abs(apart).argmin()])
+        ahead /= np.linalg.norm(ahead)
+        turn = np.stack([np.cross(apart, ahead), apart, ahead], axis=1)
+        return ends.mean(axis=0) - _DEEP * side * ahead, quaternion_of(turn)
+
+    def _posture(self, at: int) -> Postures:
+        hulls = self._hulls
+        return Postures(
+            hulls.name,
+            hulls.hulls,
+            hulls.links,
+            hulls.poses[at : at + 1],
+            hulls.low[at : at + 1],
+            hulls.high[at : at + 1],
+        )
+
+    def _close(
+        self, open_: Floats, cube: tuple[Floats, Floats], side: float
+    ) -> tuple[bool, bool, float]:
+        """Close on a cube; return whether it is grasped, stays so, and how far it slips (m)."""
+        alone = RobotAlone(
+            self._layout, (CUBE, Box((side / 2, side / 2, side / 2))), physics=_WEIGHTLESS
+        )
+        world = alone.simulation.worlds[0]
+        world.stand(NAME, open_)
+        world.set_pose(CUBE, *cube)
+        target = open_.copy()
+        for _ in range(_CLOSING):
+            target[self._gripper] = self._pressed(alone, side)
+            alone.step(alone.numbers_for(target))
+        closed, place = self._grasps(alone), self._in_hand(alone)
+        slipped, grasped = 0.0, list[bool]()
+        arm = [joint for joint in self._part.joints if joint in self._part.arm_joints][:1]
+        for step in range(_HOLDING + _SHAKING):
+            target[self._gripper] = self._pressed(alone, side)
+            shaken = target.copy()
+            for joint in arm:
+                turns = max(step - _HOLDING, 0) / _PERIOD
+                shaken[self._joints.index(joint)] += _SHAKE * np.sin(2 * np.pi * turns)
+            alone.step(alone.numbers_for(shaken))
+            grasped.append(self._grasps(alone))
+            slipped = max(slipped, float(np.linalg.norm(self._in_hand(alone) - place)))
+        held = closed and any(grasped[-_PERIOD:])
+        return closed, held, slipped if np.isfinite(slipped) else np.inf
+
+    def _pressed(self, alone: RobotAlone, side: float) -> Floats:
+        """Return where the gripper's joints are to go: to close, or to hold what they grasp."""
+        now = alone.simulation.read().qpos(NAME)[0].astype(float)[self._gripper]
+        share = self._motion.share_at(now)
+        closing = max(_CLOSE, self._motion.force(_STEP, self._motion.share(side)))
+        force = _HOLD if self._grasps(alone) else closing
+        return self._motion.positions(share - self._motion.pressing(force, share))
+
+    def _grasps(self, alone: RobotAlone) -> bool:
+        return bool(alone.simulation.read().is_grasping(self._arm, CUBE)[0])
+
+    def _in_hand(self, alone: RobotAlone) -> Floats:
+        """Return where the cube is in the frame of the first finger, (3,) (m)."""
+        state = alone.simulation.read()
+        finger = state.link_pose(self._arm, self._fingers.links[0])[0].astype(float)
+        return rotate(inverse(finger[3:]), state.pose(CUBE)[0, :3].astype(float) - finger[:3])

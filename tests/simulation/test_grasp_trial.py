@@ -1,0 +1,44 @@
+"""Grippers that are closed on a cube: ones that hold it, and ones that do not."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from robot_layouts.simulation.checks.grasp import try_grasps
+from robots import RobotRegistry
+from tests.simulation.test_trial import driven
+
+PANDA = RobotRegistry.load("panda")
+
+
+def test_a_gripper_that_holds_a_cube():
+    (seen,) = try_grasps(PANDA)
+    assert seen.problem is None
+    assert seen.between
+    assert seen.closed
+    assert seen.grasps
+    assert 0 < seen.side <= 0.03
+
+
+def test_fingers_that_are_not_known():
+    (seen,) = try_grasps(dataclasses.replace(PANDA, fingers=None))
+    assert seen.problem is not None
+    assert "are not known, so that its grasps go unnoticed" in seen.problem
+
+
+def test_a_tcp_beside_the_fingers():
+    (seen,) = try_grasps(dataclasses.replace(PANDA, tcp_offset=(0.0, 0.0, 0.05)))
+    assert seen.problem is not None
+    assert "from where panda_leftfinger and panda_rightfinger meet" in seen.problem
+    assert 0.03 < seen.tcp_off < 0.05
+
+
+def test_a_drive_that_is_too_weak_grasps_nothing():
+    (seen,) = try_grasps(driven(PANDA, force_limit=0.01))
+    assert seen.problem == (
+        "panda_leftfinger and panda_rightfinger close on a cube of 30 mm without grasping it"
+    )
+
+
+def test_a_robot_without_a_gripper():
+    assert list(try_grasps(RobotRegistry.load("panda_stick"))) == []
