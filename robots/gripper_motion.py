@@ -15,12 +15,11 @@ from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
     quaternion_of,
-    rotation_of,
     transform,
 )
 from robot_layouts.kinematics.tree import Tree
 from robots.action_split import JointGroup, is_gripper
-from robots.descriptor import IDENTITY, RobotDescriptor
+from robots.descriptor import RobotDescriptor
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
@@ -53,7 +52,7 @@ class GripperMotion:
         """Take a robot or a limb.
 
         Raises:
-            DescriptorError: If it has no fingers, or no joint group of a gripper.
+            DescriptorError: If it has no fingers, or no gripper that is driven between two ends.
             AssetError: If its files cannot be found.
         """
         if robot.fingers is None:
@@ -68,8 +67,14 @@ class GripperMotion:
         limits = tree.limits[places]
         ends = np.concatenate([_ends(group, tree.limits, robot) for group in groups])
         self._ends = np.clip(ends, limits[:, :1], limits[:, 1:])
+        self._travels = self._ends[:, 1] - self._ends[:, 0]
+        if not np.isfinite(self._ends).all() or not self._travels.any():
+            raise DescriptorError(
+                f"the gripper of {robot.name} has no two ends between which it moves: its joints"
+                f" {', '.join(self.joints)} have no limits, or stay where they are"
+            )
         stiffness = [np.broadcast_to(group.stiffness, len(group.joints)) for group in groups]
-        self._work = float(np.concatenate(stiffness) @ (self._ends[:, 1] - self._ends[:, 0]) ** 2)
+        self._work = float(np.concatenate(stiffness) @ self._travels**2)
         rows = np.tile(home_of(robot, tree), (len(_SHARES), 1))
         rows[:, places] = self._positions(_SHARES)
         poses = tree.forward(rows)
@@ -113,12 +118,12 @@ class GripperMotion:
 
     def force(self, step: float, share: float) -> float:
         """Return the force that a target presses with which is more closed by a length (m) (N)."""
-        return step * self._work / self.slope(share) ** 2
+        return step * self._work / max(abs(self.slope(share)), _SHORT) ** 2
 
     def share_at(self, positions: Floats) -> float:
         """Return how far the gripper is open with its joints at some positions (rad, m)."""
-        closed, open_ = self._ends.T
-        return float(np.mean((positions - closed) / (open_ - closed)))
+        moves = self._travels != 0
+        return float(np.mean((positions - self._ends[:, 0])[moves] / self._travels[moves]))
 
     def positions(self, share: float) -> Floats:
         """Return the gripper's joints at a share, (joints,) (rad, m)."""
@@ -130,8 +135,7 @@ class GripperMotion:
         return np.array(columns)
 
     def _positions(self, shares: Floats) -> Floats:
-        closed, open_ = self._ends.T
-        return np.asarray(closed + shares[:, None] * (open_ - closed))
+        return np.asarray(self._ends[:, 0] + shares[:, None] * self._travels)
 
 
 @lru_cache(maxsize=64)
@@ -164,7 +168,9 @@ def gripper_turn(robot: RobotDescriptor) -> Floats | None:
         AssetError: If its files cannot be found.
     """
     if not robot.tcp_position_links:
-        return _turn_of_fingers(robot)
+        turned = gripper_frame(robot)
+        aligned = abs(turned[1, 1]) > _AXIS_ALIGNED and turned[2, 2] > _AXIS_ALIGNED
+        return None if aligned else quaternion_of(turned)
     tree, qpos = gripper_tree(robot), np.array(robot.keyframe(robot.home.keyframe), float)
     places = [
         robot.joints.index(joint)
@@ -178,16 +184,23 @@ def gripper_turn(robot: RobotDescriptor) -> Floats | None:
         qpos[places] = low + share * (high - low)
         postures.append(tips(tree, robot, qpos))
     shut, ajar, *_ = sorted(postures, key=_gap)
-    return _turn_to(shut.mean(0), ajar[-1] - ajar[0])
+    approach = _unit(shut.mean(0))
+    apart = ajar[-1] - ajar[0]
+    opening = _unit(apart - apart @ approach * approach)
+    if not (approach.any() and opening.any()):
+        return None
+    return quaternion_of(np.stack([np.cross(opening, approach), opening, approach], 1))
 
 
 def gripper_frame(robot: RobotDescriptor) -> Floats:
-    """Return the orientation of the gripper's frame in the TCP link's, (3, 3)."""
+    """Return the orientation of the gripper's frame in the TCP link's, (3, 3).
+
+    That of a robot without fingers, or whose fingers nothing drives, is the TCP link's own.
+    """
     try:
         return gripper_motion(robot).turn
     except DescriptorError:
-        turned = gripper_turn(robot)
-        return rotation_of(IDENTITY if turned is None else turned)
+        return np.eye(3)
 
 
 def _wrist(robot: RobotDescriptor, tree: Tree) -> int:
@@ -199,44 +212,11 @@ def _wrist(robot: RobotDescriptor, tree: Tree) -> int:
 def _axes(ahead: Floats, apart: Floats) -> Floats:
     """Return the frame whose y axis is one way, and whose z axis is nearest to another, (3, 3)."""
     opening = _unit(apart)
-    if not opening.any():
-        opening = np.array((0.0, 1.0, 0.0))
+    opening = opening * np.sign(opening.sum()) if opening.any() else np.array((0.0, 1.0, 0.0))
     approach = _unit(ahead - ahead @ opening * opening)
     if not approach.any():
         approach = _unit(np.cross((1.0, 0.0, 0.0), opening))
     return np.stack([np.cross(opening, approach), opening, approach], axis=1)
-
-
-def _turn_of_fingers(robot: RobotDescriptor) -> Floats | None:
-    """Return the turn into the frame by which way the fingers open, seen from the wrist."""
-    fingers = robot.fingers
-    if fingers is None or not robot.arm_joints:
-        return None
-    tree = gripper_tree(robot)
-    poses = _poses(tree, np.array(robot.keyframe(robot.home.keyframe), float))
-    tcp, wrist = find_tcp(robot, tree), _wrist(robot, tree)
-    turn = poses[tcp.turned, :3, :3]
-    one, other = (
-        sign * poses[tree.link(link), :3, :3] @ axis
-        for link, sign, axis in zip(
-            fingers.links, fingers.opening_signs, fingers.opening_axes, strict=True
-        )
-    )
-    ahead = (tcp.places(poses[None])[0] - poses[wrist, :3, 3]) @ turn
-    opening = _unit((one - other) @ turn)
-    approach = _unit(ahead - ahead @ opening * opening)
-    if abs(opening[1]) > _AXIS_ALIGNED and approach[2] > _AXIS_ALIGNED:
-        return None
-    return _turn_to(approach, opening * (np.sign(opening.sum()) or 1.0))
-
-
-def _turn_to(approach: Floats, apart: Floats) -> Floats | None:
-    """Return the turn to a frame with an approach and a way in which the fingers part, (4,)."""
-    approach = _unit(approach)
-    opening = _unit(apart - apart @ approach * approach)
-    if not (approach.any() and opening.any()):
-        return None
-    return quaternion_of(np.stack([np.cross(opening, approach), opening, approach], 1))
 
 
 @lru_cache(maxsize=64)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from robot_layouts.experts.script import Scene
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, rotation_about
 from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
-from robots.gripper_motion import gripper_frame, gripper_motion, link_tree
+from robots.gripper_motion import gripper_motion, link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 
@@ -64,12 +64,11 @@ class Hand:
         layout = task.standing()
         own, self.owner = layout.arm(arm).robot, layout.owner(arm)
         robot = layout[self.owner].robot
-        self.arm, self.motion, self._own = arm, gripper_motion(own), own
+        self.arm, self.motion = arm, gripper_motion(own)
         self.columns = [robot.joints.index(joint) for joint in own.arm_joints]
         self._gripper = [robot.joints.index(joint) for joint in self.motion.joints]
         pose = layout[self.owner].base_pose
         self.base = pose_matrix(pose.position, pose.quaternion)
-        self._frame = gripper_frame(own)
         whole = link_tree(robot)
         self._tree = whole.towards(find_tcp(own, whole).needed)
         self._tcp = find_tcp(own, self._tree)
@@ -80,10 +79,6 @@ class Hand:
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""
         return scene.qpos(self.owner)
-
-    def share(self, scene: Scene) -> float:
-        """Return how far its gripper is open now, from 0 to 1."""
-        return self.motion.share_at(self.qpos(scene)[self._gripper])
 
     def joints(self, qpos: Floats) -> Floats:
         """Return the arm's joints among all of its robot, (…, arm joints) (rad)."""
@@ -101,7 +96,7 @@ class Hand:
 
     def turns(self, qpos: Floats) -> Floats:
         """Return the orientation of the gripper's frame in postures, (k, 3, 3), world."""
-        return self.link(qpos)[:, :3, :3] @ self._frame
+        return self.link(qpos)[:, :3, :3] @ self.motion.turn
 
     def held(self, scene: Scene, body: str) -> Floats:
         """Return where a body's origin is in the TCP link's frame, (3,) (m)."""
@@ -138,7 +133,7 @@ class Hand:
         goal = IkGoal(
             np.repeat(places @ root[:3, :3].T + root[:3, 3], s, axis=0),
             (self._tcp.turned,),
-            np.repeat(root[:3, :3] @ turns @ self._frame.T, s, axis=0),
+            np.repeat(root[:3, :3] @ turns @ self.motion.turn.T, s, axis=0),
             self._tcp.turned,
             point,
         )

@@ -125,8 +125,8 @@ def shared_place(layout: Layout, places: tuple[str, ...]) -> tuple[tuple[float, 
     reach = min(layout.arm(place).robot.reach for place in places)
     cell = _CELL * reach
     reached = [_near_ground(layout, place, _HEIGHT * reach) for place in places]
-    low = np.min([points.min(axis=0) for points in reached if len(points)], axis=0) - 2 * cell
-    high = np.max([points.max(axis=0) for points in reached if len(points)], axis=0) + 2 * cell
+    everywhere = np.concatenate(reached) if all(map(len, reached)) else np.zeros((1, 2))
+    low, high = everywhere.min(axis=0) - 2 * cell, everywhere.max(axis=0) + 2 * cell
     counts = np.ceil((high - low) / cell).astype(int)
     shared = np.ones(counts, bool)
     for points in reached:

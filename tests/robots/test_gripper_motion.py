@@ -1,5 +1,7 @@
 """How grippers move: openings, the point between the fingers, and the frame."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,14 @@ def test_force_and_step_are_inverse(name: str):
     motion = gripper_motion(load(name))
     force = motion.force(1e-4, 0.5)
     assert motion.pressing(force, 0.5) * motion.slope(0.5) == pytest.approx(1e-4)
+
+
+def test_a_gripper_that_stays_where_it_is_has_no_two_ends():
+    panda = load("panda")
+    group = panda.action_split.groups["gripper"]
+    shut = replace(group, lower=-0.02, upper=-0.01)  # below the joints' limits: 0 to 0.04 m
+    with pytest.raises(DescriptorError, match="no two ends between which it moves"):
+        gripper_motion(replace(panda, action_split=panda.action_split.replace(gripper=shut)))
 
 
 def test_without_fingers_there_is_none():

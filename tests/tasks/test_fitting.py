@@ -69,6 +69,12 @@ def test_arms_that_share_nothing_are_refused():
         tasks.make(TASK, layout=two("so100", spacing=3.0))
 
 
+def test_arms_that_never_get_near_the_ground_are_refused_in_the_same_words():
+    high = two("so100").moved((0.0, 0.0, 3.0))
+    with pytest.raises(TaskError, match="no place on the ground is in reach"):
+        tasks.make(TASK, layout=high)
+
+
 def test_the_shared_place_lies_in_the_middle_of_equal_arms():
     (x, y), depth = shared_place(two("panda", spacing=1.5), ("left", "right"))
     assert np.hypot(x, y) < 0.05

@@ -24,11 +24,10 @@ from tasks import TaskEnv
 
 GIVER, TAKER, CUBE, GOAL = "left", "right", "cube", "goal_site"
 
-# Shares of the cube's edge.
-# How far before the cube's middle each gripper's own middle is. Hands that hold more than their own
-# half hold it by different faces.
+# Shares of the cube's edge: how far before the cube's middle each gripper's own middle is. Hands
+# that hold more than their own half hold it by different faces.
 DEPTHS = (0.2, -0.1, -0.35)
-OWN_HALF = 0.1
+OWN_HALF = 0.1  # the least depth at which each holds its own half
 SLACK = 0.45  # how much wider than the cube a gripper is open
 
 # Lengths for a Panda (m), as the task fits others.
@@ -39,8 +38,8 @@ LEANS = tuple(map(radians, (20, 50, 80, 100)))  # of the giver when it gives, fr
 HEADINGS = tuple(map(radians, (0, 45, -45)))  # of the giver then, from the way to the meeting
 UPWARD = -0.2  # cosine: a gripper that picks points down more than that
 STRIDE = 0.4  # rad between postures on a way that are checked
-CLOSING, STEP = 60.0, 4e-4  # N with which fingers close until they feel the cube, or m per step
-FORCE, LEAST_FORCE = 15.0, 1.5  # N with which they do, on a cube for Pandas; on any
+CLOSING, STEP = 60.0, 4e-4  # N with which fingers close on the cube, at least; m per step, at least
+FORCE, LEAST_FORCE = 15.0, 1.5  # N with which they hold a cube for Pandas; any cube, at least
 CROSSWISE = 0.5  # cosine between the ways in which two hands open that hold different faces
 SIMILAR = 0.5  # cosine between the approach that was planned and that which is taken
 APART = 0.4  # cosine between the approaches of two hands at most
@@ -101,7 +100,7 @@ class _Search:
     """What a scene lets two hands do."""
 
     def __init__(self, task: TaskEnv, scene: Scene, depth: float) -> None:
-        self._task, self._scene = task, scene
+        self._scene = scene
         self._giver, self._taker = Hand(task, GIVER), Hand(task, TAKER)
         self._fit = task.fit
         self._cube = pose_matrix(*scene.body(CUBE))
@@ -294,7 +293,7 @@ class _Search:
         cube_held = partial(Scene.grasps, robot=GIVER, body=CUBE)
         cube_taken = partial(Scene.grasps, robot=TAKER, body=CUBE)
         length = self._fit.length
-        # As much heavier as the cube is; a light one is pressed out of the fingers by more.
+        # In proportion to its weight: a light cube that is pressed harder slips out.
         force = max(FORCE * self._fit.scale**3, LEAST_FORCE)
         give_share, take_share = self._shares
         picked = self._giver.turns(meeting.pick[None])[0]
@@ -307,7 +306,7 @@ class _Search:
                 Waypoint("around", joints=partial(back, by=0.0), share=give_share, near=0.06),
                 Waypoint("grasp", squeeze=self._closing(self._giver), until=cube_held, most=150),
                 Waypoint("hold", squeeze=force, steps=4, until=cube_held, most=20),
-                Waypoint("lift", joints=partial(self._lift, meeting), squeeze=force, near=0.08),
+                Waypoint("lift", joints=self._lift, squeeze=force, near=0.08),
                 Waypoint("present", joints=partial(self._give, meeting), squeeze=force, near=0.06),
                 Waypoint("release", share=give_share, steps=3, after=("right.take",)),
                 Waypoint("retreat", joints=self._retreat, share=give_share, near=0.1),
@@ -354,7 +353,7 @@ class _Search:
         place = scene.body(CUBE)[0] + offsets(turn[None], self._before + by)[0]
         return self._near(hand, place, turn, hand.motion.middle(share), posture)
 
-    def _lift(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
+    def _lift(self, scene: Scene) -> Sequence[Floats]:
         hand, held = self._giver, self._giver.held(scene, CUBE)
         now = hand.qpos(scene)
         place = scene.body(CUBE)[0] + (0.0, 0.0, self._fit.length(LIFT))

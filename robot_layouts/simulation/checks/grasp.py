@@ -31,6 +31,7 @@ _SHARES = 33  # postures from one end of the gripper to the other
 _POINT = 1e-4  # m; half the size of the body that stands for a point
 _CLOSING, _HOLDING, _SHAKING = 200, 20, 40  # steps
 _CLOSE, _HOLD = 30.0, 3.0  # N with which fingers close until they feel the cube, and hold it
+_AJAR = 1.4  # of the cube's side: how far the fingers are apart before they close
 _DEEP = 0.1  # of the cube's side: how far it lies from the TCP towards the palm
 _STEP = 2e-4  # m by which they close in a step at least
 _SHAKE, _PERIOD = 0.1, 10  # rad or m to both sides, and steps; 0.5 m away that is some 8 m/s²
@@ -75,6 +76,8 @@ class GraspTrial(NamedTuple):
         if self.fingers is None:
             return f"the fingers of {self.arm} are not known, so that its grasps go unnoticed"
         pair, side = " and ".join(self.fingers), f"a cube of {self.side * 1e3:.3g} mm"
+        if np.isinf(self.tcp_off):
+            return f"{pair} are not to be tried: one of them has no collision shapes"
         if not self.between:
             off = f"{self.tcp_off * 1e3:.3g} mm"
             return f"the TCP of {self.arm} is {off} from where {pair} meet"
@@ -121,13 +124,13 @@ class _Gripper:
         layout = single({NAME: robot}).in_control_mode("pd_joint_pos")
         placement, self._part = layout[NAME], layout.arm(arm).robot
         self._layout, self._arm, self._fingers = layout, arm, fingers
-        self._start = np.array(placement.start_qpos)
         model = load_model(placement.robot)
         tree = model.kinematics
         self._joints = placement.robot.joints
-        ends = np.array([self._at(0), self._at(1)])
-        shares = np.linspace(0, 1, _SHARES)[:, None]
-        rows = (ends[0] + shares * (ends[1] - ends[0])).clip(*tree.limits.T)
+        self._motion = gripper_motion(self._part)
+        self._gripper = [self._joints.index(joint) for joint in self._motion.joints]
+        rows = np.tile(np.array(placement.start_qpos), (_SHARES, 1))
+        rows[:, self._gripper] = [self._motion.positions(at) for at in np.linspace(0, 1, _SHARES)]
         self._hulls = stand_hulls(NAME, placement.base_pose, model, rows)
         base = placement.base_pose
         poses = pose_matrix(base.position, base.quaternion) @ tree.forward(rows)
@@ -138,19 +141,7 @@ class _Gripper:
             for body in bodies
         ]
         self._roots = poses[:, [tree.link(link) for link in fingers.links]][..., :3, 3].mean(axis=1)
-        self._rows, self._motion = rows, gripper_motion(self._part)
-        self._gripper = [self._joints.index(joint) for joint in self._motion.joints]
-
-    def _at(self, end: int) -> Floats:
-        """Return the joints with the gripper's numbers at one end, (dof,) (rad, m)."""
-        qpos = self._start.copy()
-        for name, group in self._part.action_split.groups.items():
-            if is_gripper(name):
-                for i, joint in enumerate(group.joints):
-                    value = group.ranges[0 if group.mimic else i][end]
-                    times, plus = group.followers[i] if group.mimic else (1.0, 0.0)
-                    qpos[self._joints.index(joint)] = times * value + plus
-        return qpos
+        self._rows = rows
 
     def trial(self) -> GraspTrial:
         """Compare TCP and fingers, and close them on a cube."""
@@ -168,7 +159,8 @@ class _Gripper:
             if not (seen.between and side > 0):
                 return seen
             fitting = [at for at in between if gaps[at] >= side][-1]
-            open_, cube = self._rows[wide], self._cube(ends[fitting], fitting, side)
+            ajar = [at for at in between if gaps[at] >= _AJAR * side][-1:] or [wide]
+            open_, cube = self._rows[ajar[0]], self._cube(ends[fitting], fitting, side)
             closed, held, slipped = self._close(open_, cube, side)
             seen = seen._replace(side=side, closed=closed, held=held, slipped=slipped)
             if seen.grasps:
