@@ -11,14 +11,16 @@ from robots import JointGroup, RobotDescriptor
 from robots.action_split import is_gripper
 from robots.gripper_motion import gripper_motion
 
-GAIN = 2.0  # of the joint error; PhysX's drive follows about 0.4 of a target in one step
+GAIN = 2.0  # of the joint error at most; a Panda's drives follow 0.4 of a target in one step
+_LEAST_DAMPING = 1e-9  # N·m·s/rad; of drives that have none
 
 
 class ArmDriver:
     """Drives one robot's arm towards a goal; generated from its action split."""
 
-    def __init__(self, descriptor: RobotDescriptor) -> None:
-        """Take a robot."""
+    def __init__(self, descriptor: RobotDescriptor, seconds: float = 0.05) -> None:
+        """Take a robot, and how long a control step takes (s)."""
+        self._seconds = seconds
         self._place = {joint: i for i, joint in enumerate(descriptor.joints)}
         self._arm_joints = descriptor.arm_joints
         self._groups = dict(descriptor.action_split.groups)
@@ -58,8 +60,14 @@ class ArmDriver:
             elif group.mimic:
                 parts.append(self._opening(group, goals))
             else:
-                parts.append(self._towards(group, goals, qpos))
+                parts.append(self._towards(group, goals, qpos, holding=squeeze is not None))
         return np.concatenate(parts)
+
+    def _gain(self, group: JointGroup) -> Floats:
+        """Return the factor on each joint's error with which its drive does not overshoot."""
+        stiffness, damping = np.array(group.stiffness), np.maximum(group.damping, _LEAST_DAMPING)
+        follows = 1 - np.exp(-self._seconds * stiffness / damping)
+        return np.minimum(GAIN, 1 / np.maximum(follows, 1 / GAIN))
 
     def _squeezing(self, force: float, qpos: Floats) -> float:
         """Return the share towards which the gripper presses with a force, by its drives."""
@@ -73,11 +81,16 @@ class ArmDriver:
         value = (goals[group.joints[0]] - plus) / times
         return np.clip([(2 * value - high - low) / (high - low)], -1.0, 1.0)
 
-    def _towards(self, group: JointGroup, goals: Mapping[str, float], qpos: Floats) -> Floats:
+    def _towards(
+        self, group: JointGroup, goals: Mapping[str, float], qpos: Floats, *, holding: bool
+    ) -> Floats:
+        """Return a group's numbers; quick drives go slower with something in the hand."""
         target = np.array([goals[joint] for joint in group.joints])
         low, high = np.array(group.ranges).T
         if not group.delta:
             return (2 * target - high - low) / (high - low)
         error = target - qpos[[self._place[joint] for joint in group.joints]]
-        numbers = (2 * GAIN * error - high - low) / (high - low)
-        return numbers / max(1.0, np.abs(numbers).max())
+        gain = self._gain(group)
+        numbers = (2 * gain * error - high - low) / (high - low)
+        most = gain / GAIN if holding else np.ones(group.size)
+        return numbers / max(1.0, (np.abs(numbers) / most).max())

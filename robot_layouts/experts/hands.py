@@ -32,15 +32,21 @@ class HandPostures:
         which: Number of the pose that each was asked for, (k,).
         qpos: All joints of the robot, (k, dof) (rad, m).
         turns: Orientation of the gripper's frame that each gives it, (k, 3, 3), world.
+        off: By how much that is turned otherwise than was asked for, (k,) (rad).
     """
 
     which: NDArray[np.intp]
     qpos: Floats
     turns: Floats
+    off: Floats
 
     def __len__(self) -> int:
         """Return how many there are."""
         return len(self.which)
+
+    def __getitem__(self, some: NDArray[np.intp]) -> HandPostures:
+        """Return some of them, in that order."""
+        return HandPostures(self.which[some], self.qpos[some], self.turns[some], self.off[some])
 
 
 class Hand:
@@ -50,6 +56,7 @@ class Hand:
         arm: Its name in the layout.
         owner: The robot that it belongs to.
         motion: How its gripper moves.
+        length: How far it reaches (m).
         columns: Indices of the arm's joints among the robot's.
         base: Pose of the robot's base in the world, (4, 4) (m).
     """
@@ -64,7 +71,7 @@ class Hand:
         layout = task.standing()
         own, self.owner = layout.arm(arm).robot, layout.owner(arm)
         robot = layout[self.owner].robot
-        self.arm, self.motion = arm, gripper_motion(own)
+        self.arm, self.motion, self.length = arm, gripper_motion(own), own.reach
         self.columns = [robot.joints.index(joint) for joint in own.arm_joints]
         self._gripper = [robot.joints.index(joint) for joint in self.motion.joints]
         pose = layout[self.owner].base_pose
@@ -143,8 +150,8 @@ class Hand:
         ways = np.abs(qpos - starts[0])[:, self.columns].max(axis=1)
         ways = np.where(fits, ways, np.inf).reshape(n, s)
         which = np.flatnonzero(np.isfinite(ways.min(axis=1)))
-        best = qpos.reshape(n, s, -1)[which, ways.argmin(axis=1)[which]]
-        return HandPostures(which, best, self.turns(best))
+        chosen = which * s + ways.argmin(axis=1)[which]
+        return HandPostures(which, qpos[chosen], self.turns(qpos[chosen]), turned[chosen])
 
     def _descended(self, goal: IkGoal, rows: Floats, worth: float) -> Floats:
         """Bring rows of postures towards a goal; those that are far from it soon are left there."""

@@ -1,7 +1,7 @@
 """SO-101 by TheRobotStudio, a small arm with one moving jaw: 5 + 1 action numbers."""
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
+from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, RobotDescriptor
 
 ARM = JointGroup(
     ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"),
@@ -41,6 +41,12 @@ SO101 = RobotDescriptor(
         2.0,
         0.0,
         patch_radius=0.1,
+    ),
+    fingers=Fingers(
+        links=("gripper_link", "moving_jaw_so101_v1_link"),
+        opening_signs=(-1, 1),
+        max_angle=110.0,  # the moving jaw swings, it does not slide
+        opening_axes=((0.785, 0.0, 0.619), (1.0, 0.0, 0.0)),  # as the tips part
     ),
     keyframes={
         "rest": (0.0, -0.4, 0.4, 1.2, 0.0, 1.0),

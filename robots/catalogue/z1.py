@@ -1,7 +1,14 @@
 """Unitree Z1 with its gripper of one moving jaw: 6 + 1 action numbers."""
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor, names
+from robots.descriptor import (
+    ActionSplit,
+    Fingers,
+    GripperMaterial,
+    JointGroup,
+    RobotDescriptor,
+    names,
+)
 from robots.parts import among
 
 ARM = JointGroup(
@@ -47,6 +54,12 @@ Z1 = RobotDescriptor(
         2.0,
         0.0,
         patch_radius=0.1,
+    ),
+    fingers=Fingers(
+        links=("gripperStator", "gripperMover"),
+        opening_signs=(1, 1),
+        max_angle=110.0,  # the moving jaw swings, it does not slide
+        opening_axes=((0.746, 0.0, -0.666), (0.0, 0.0, 1.0)),  # as the tips part
     ),
     keyframes={
         "rest": (0.0, 1.4, -0.75, 0.0, 0.0, 0.0, -1.5707),

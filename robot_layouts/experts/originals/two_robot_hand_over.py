@@ -28,6 +28,7 @@ GIVER, TAKER, CUBE, GOAL = "left", "right", "cube", "goal_site"
 # that hold more than their own half hold it by different faces.
 DEPTHS = (0.2, -0.1, -0.35)
 OWN_HALF = 0.1  # the least depth at which each holds its own half
+NEAR = 0.3  # how far from its place a gripper may be when it closes or waits
 SLACK = 0.45  # how much wider than the cube a gripper is open
 
 # Lengths for a Panda (m), as the task fits others.
@@ -41,6 +42,7 @@ STRIDE = 0.4  # rad between postures on a way that are checked
 CLOSING, STEP = 60.0, 4e-4  # N with which fingers close on the cube, at least; m per step, at least
 FORCE, LEAST_FORCE = 15.0, 1.5  # N with which they hold a cube for Pandas; any cube, at least
 CROSSWISE = 0.5  # cosine between the ways in which two hands open that hold different faces
+ALIGNED = 4.0  # rad of way that a hand is worth which is turned as the cube is, by 1 rad
 SIMILAR = 0.5  # cosine between the approach that was planned and that which is taken
 APART = 0.4  # cosine between the approaches of two hands at most
 
@@ -165,8 +167,7 @@ class _Search:
         if not len(picks):
             raise TaskError(f"{GIVER!r} cannot reach the cube with its gripper")
         down = 1 + picks.turns[:, 2, 2]
-        order = np.argsort(hand.way(picks.qpos, starts[0]) + down)
-        return HandPostures(picks.which[order], picks.qpos[order], picks.turns[order])
+        return picks[np.argsort(hand.way(picks.qpos, starts[0]) + down + ALIGNED * picks.off)]
 
     def _meetings(self, picks: HandPostures) -> Iterator[_Exchange]:
         giver = self._giver
@@ -229,6 +230,7 @@ class _Search:
                 float(self._giver.way(gives.qpos[row], pick))
                 + 0.5 * float(taker.way(takes.qpos[i], start))
                 + 1.5 * (1 + apart)
+                + ALIGNED * float(takes.off[i])
             )
             yield _Exchange(
                 pick,
@@ -296,6 +298,7 @@ class _Search:
         # In proportion to its weight: a light cube that is pressed harder slips out.
         force = max(FORCE * self._fit.scale**3, LEAST_FORCE)
         give_share, take_share = self._shares
+        give_near, take_near = (NEAR * self._edge / hand.length for hand in (self._giver, self._taker))
         picked = self._giver.turns(meeting.pick[None])[0]
         back = partial(self._off, self._giver, meeting.pick, picked, give_share)
         return {
@@ -303,11 +306,13 @@ class _Search:
                 Waypoint(
                     "above", joints=partial(back, by=length(BACK)), share=give_share, near=0.08
                 ),
-                Waypoint("around", joints=partial(back, by=0.0), share=give_share, near=0.06),
+                Waypoint("around", joints=partial(back, by=0.0), share=give_share, near=give_near),
                 Waypoint("grasp", squeeze=self._closing(self._giver), until=cube_held, most=150),
                 Waypoint("hold", squeeze=force, steps=4, until=cube_held, most=20),
                 Waypoint("lift", joints=self._lift, squeeze=force, near=0.08),
-                Waypoint("present", joints=partial(self._give, meeting), squeeze=force, near=0.06),
+                Waypoint(
+                    "present", joints=partial(self._give, meeting), squeeze=force, near=give_near
+                ),
                 Waypoint("release", share=give_share, steps=3, after=("right.take",)),
                 Waypoint("retreat", joints=self._retreat, share=give_share, near=0.1),
             ),
@@ -319,7 +324,7 @@ class _Search:
                     "around",
                     joints=partial(self._take, meeting),
                     share=take_share,
-                    near=0.06,
+                    near=take_near,
                     after=("left.present",),
                 ),
                 Waypoint("take", squeeze=self._closing(self._taker), until=cube_taken, most=150),
