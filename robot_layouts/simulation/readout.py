@@ -268,23 +268,23 @@ class FramePairs:
     subtraction and one norm over all pairs.
 
     Attributes:
-        starts: First frame of every pair, (K,).
-        ends: Second frame of every pair, (K,).
+        frames: Last and first frame of every pair, (2, K).
         planar: Numbers of the pairs whose distance is seen from above.
     """
 
     def __init__(self) -> None:
         """Start without pairs."""
         self._places: dict[tuple[int, int, bool], int] = {}
-        self.starts = self.ends = self.planar = np.empty(0, np.intp)
+        self.frames = np.empty((2, 0), np.intp)
+        self.planar: slice | list[int] = []
 
     def place(self, start: int, end: int, *, planar: bool) -> int:
         """Return the number of a pair, adding it if it is new."""
         found = self._places.get((start, end, planar))
         if found is None:
             found = self._places[start, end, planar] = len(self._places)
-            self.starts, self.ends, planar_flags = np.array(list(self._places), np.intp).T
-            self.planar = np.flatnonzero(planar_flags)
+            self.frames = np.array([(last, first) for first, last, _ in self._places], np.intp).T
+            self.planar = _as_slice([k for k, (_, _, flat) in enumerate(self._places) if flat])
         return found
 
 

@@ -375,7 +375,7 @@ class State:
 
         Those speeds are left out that were not read in time.
         """
-        ways = self._all_offsets(len(self._index.pairs.ends) - 1)
+        ways = self._all_offsets(self._index.pairs.frames.shape[1] - 1)
         velocities = self._velocities
         if not self._moment.past:
             velocities = self._all_velocities(len(self._index.velocities.keys) - 1)
@@ -386,9 +386,9 @@ class State:
         """Offsets of all pairs that were ever asked for, (K, N, 3), at least up to ``place``."""
         if place >= len(self._offsets):
             pairs = self._index.pairs
-            ways = self.all_poses.take(pairs.ends, 0) - self.all_poses.take(pairs.starts, 0)
-            if len(pairs.planar):
-                ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
+            ends, starts = self.all_poses.take(pairs.frames, 0)
+            ways = ends - starts
+            ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
             self._offsets = ways[:, :, :3]
         return self._offsets
 

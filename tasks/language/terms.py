@@ -134,17 +134,17 @@ def diagonal(side: float, beyond: float = 0.0) -> float:
 
 
 def _recalled(compute: Callable[..., Floats]) -> Callable[..., Floats]:
-    """Recall what was computed lately of the same numbers: some poses stay for a whole episode."""
+    """Recall what was computed lately of the same poses: some stay for a whole episode."""
 
     @lru_cache(maxsize=LATEST)
-    def latest(*given: tuple[tuple[int, ...], str, bytes]) -> Floats:
-        return compute(*[np.frombuffer(data, kind).reshape(s) for s, kind, data in given])
+    def latest(*poses: tuple[str, bytes]) -> Floats:
+        return compute(*[np.frombuffer(data, kind).reshape(-1, 7) for kind, data in poses])
 
     @wraps(compute)
     def recall(*poses: Floats) -> Floats:
         if isinstance(poses[0], Tensor) or len(poses[0]) > FEW:
             return compute(*poses)
-        return latest(*[(p.shape, p.dtype.char, p.tobytes()) for p in poses]).copy()
+        return latest(*[(pose.dtype.char, pose.tobytes()) for pose in poses]).copy()
 
     return recall
 
@@ -172,13 +172,12 @@ def inverse(pose: Floats) -> Floats:
     return concatenate((_rotated(turned_back, -pose[:, :3]), turned_back), 1)
 
 
-@_recalled
 def transform(pose: Floats, point: Floats) -> Floats:
-    """Return points that are given in the frame ``pose`` in the frame of ``pose``, (N, 3) (m).
+    """Return points that are given in the frame ``pose`` in the frame of ``pose``, (..., N, 3) (m).
 
     Args:
         pose: Shape (N, 7).
-        point: Shape (N, 3) or (1, 3) (m).
+        point: Shape (..., N, 3) or (..., 1, 3) (m).
     """
     return pose[:, :3] + _rotated(pose[:, 3:], point)
 
