@@ -232,8 +232,10 @@ def arctan2(y: Array, x: Array) -> Any:
     """
     if isinstance(y, Tensor):
         return torch.stack([torch.atan2(a, b) for a, b in zip(y, _any(x), strict=True)])
-    rows = zip(torch.from_numpy(y).unbind(), torch.from_numpy(x).unbind(), strict=True)
-    return np.array([torch.atan2(a, b).item() for a, b in rows], y.dtype)
+    angles = y.copy()
+    for a, b in zip(torch.from_numpy(angles).unbind(), torch.from_numpy(x).unbind(), strict=True):
+        a.atan2_(b)
+    return angles
 
 
 def norm(x: Array) -> Any:
