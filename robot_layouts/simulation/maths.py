@@ -295,15 +295,17 @@ def rounded(value: float) -> float:
     return float(np.float32(value))
 
 
-def _each(x: Array, function: Callable[..., Tensor], in_place: Callable[..., Tensor]) -> Any:
+def _each(
+    x: Array | Tensor, function: Callable[..., Tensor], in_place: Callable[..., Tensor]
+) -> Any:
     """Return what a function of torch makes of every number.
 
     Where it writes in place, NumPy need not take a tensor back, which takes as long as the function
-    does. Numbers that do not lie side by side are computed by another loop, with other bits.
+    does.
     """
     if isinstance(x, Tensor):
         return function(x)
-    if x.dtype.kind != "f" or not x.flags.c_contiguous:
+    if x.dtype.kind != "f":  # whole numbers, which have no place for what is between them
         return function(torch.from_numpy(x)).numpy()
     values = x.copy()
     in_place(torch.from_numpy(values))

@@ -371,9 +371,9 @@ class State:
         return self._distances[place]
 
     def _measure(self) -> None:
-        """Take all distances and speeds that were ever asked for: one norm costs most for the call.
+        """Take all distances and speeds that were ever asked for; norms cost little but the call.
 
-        Those speeds are left out that were not read in time.
+        Those speeds are left out whose velocities were not read in time.
         """
         ways = self._all_offsets(self._index.pairs.frames.shape[1] - 1)
         velocities = self._velocities

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import lru_cache, wraps
-from typing import Any
+from functools import lru_cache
 
 import numpy as np
 from torch import Tensor
@@ -36,14 +35,14 @@ HEIGHT_TOLERANCE = 0.005  # m
 SLOW, SLOW_SPIN = 1e-2, 0.5  # m/s, rad/s
 
 # Component j of a product is the sum over k of a[k] · b[_FACTOR[k, j]] · _SIGN[k, j], k = 0 first.
-# All three of one shape for a single pose, of which NumPy takes the product in half the time.
+# Signs have the shape of a single pose's factors: NumPy multiplies these in half the time.
 _TERM = np.repeat(np.arange(4), 4).reshape(4, 4)
 _FACTOR = np.array(((0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)))
 _SIGN = np.array((((1, 1, 1, 1), (-1, 1, -1, 1), (-1, 1, 1, -1), (-1, -1, 1, 1)),), np.float32)
 _CONJUGATE = np.array(((1, -1, -1, -1),), np.float32)
 _BACK = _SIGN * _CONJUGATE[:, _FACTOR]  # of a product with the conjugate of b
 
-FEW, LATEST = 32, 32  # poses up to which results are recalled, and how many of each function
+FEW, LATEST = 32, 32  # poses up to which results are recalled, and of how many calls
 
 _SMALL_ANGLE = 1e-6  # below it sin(x / 2) / x is taken from its series (rad)
 
@@ -133,23 +132,6 @@ def diagonal(side: float, beyond: float = 0.0) -> float:
 # observations and rewards, so these stand apart from `robot_layouts.kinematics.rotations`.
 
 
-def _recalled(compute: Callable[..., Floats]) -> Callable[..., Floats]:
-    """Recall what was computed lately of the same poses: some stay for a whole episode."""
-
-    @lru_cache(maxsize=LATEST)
-    def latest(*poses: tuple[str, bytes]) -> Floats:
-        return compute(*[np.frombuffer(data, kind).reshape(-1, 7) for kind, data in poses])
-
-    @wraps(compute)
-    def recall(*poses: Floats) -> Floats:
-        if isinstance(poses[0], Tensor) or len(poses[0]) > FEW:
-            return compute(*poses)
-        return latest(*[(pose.dtype.char, pose.tobytes()) for pose in poses]).copy()
-
-    return recall
-
-
-@_recalled
 def compose(first: Floats, second: Floats) -> Floats:
     """Return the pose that ``second`` has in the world if ``first`` is the frame it is given in.
 
@@ -160,16 +142,12 @@ def compose(first: Floats, second: Floats) -> Floats:
     Returns:
         Shape (N, 7), with w ≥ 0.
     """
-    position = first[:, :3] + _rotated(first[:, 3:], second[:, :3])
-    turned = _with_positive_w(_product(first[:, 3:], second[:, 3:]))
-    return concatenate((position, turned), 1)
+    return _recalled(_composed, first, second)
 
 
-@_recalled
 def inverse(pose: Floats) -> Floats:
     """Return the inverse of poses, shape (N, 7)."""
-    turned_back = _conjugate(pose[:, 3:])
-    return concatenate((_rotated(turned_back, -pose[:, :3]), turned_back), 1)
+    return _recalled(_inverted, pose)
 
 
 def transform(pose: Floats, point: Floats) -> Floats:
@@ -196,6 +174,29 @@ def angle_between(first: Floats, second: Floats) -> Floats:
         ratio = where(small, 0.5 - angle * angle / 48.0, sin(half_angle) / angle)
     turned = norm(axis / ratio[:, None])
     return minimum(turned, (2 * math.pi) - turned)
+
+
+def _recalled(compute: Callable[..., Floats], *poses: Floats) -> Floats:
+    """Compute something of poses, or recall it: what stands still is asked for in every step."""
+    if isinstance(poses[0], Tensor) or len(poses[0]) > FEW:
+        return compute(*poses)
+    return _latest(compute, *[(pose.dtype.char, pose.tobytes()) for pose in poses]).copy()
+
+
+@lru_cache(maxsize=LATEST)
+def _latest(compute: Callable[..., Floats], *poses: tuple[str, bytes]) -> Floats:
+    return compute(*[np.frombuffer(data, kind).reshape(-1, 7) for kind, data in poses])
+
+
+def _composed(first: Floats, second: Floats) -> Floats:
+    position = first[:, :3] + _rotated(first[:, 3:], second[:, :3])
+    turned = _with_positive_w(_product(first[:, 3:], second[:, 3:]))
+    return concatenate((position, turned), 1)
+
+
+def _inverted(pose: Floats) -> Floats:
+    turned_back = _conjugate(pose[:, 3:])
+    return concatenate((_rotated(turned_back, -pose[:, :3]), turned_back), 1)
 
 
 def _product(a: Floats, b: Floats, signs: Floats = _SIGN) -> Floats:
