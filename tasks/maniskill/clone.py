@@ -39,18 +39,6 @@ class Clone(MultiRobotTask):
         total: Any = sum(state.link_pose(robot, link) for link in links)
         return total / len(links)
 
-    def agent_tcp_offset(self, state: State, robot: str, body: str) -> Floats:
-        """Return the way from native's ``agent.tcp_pose`` to a body's origin, (N, 3) (m, world)."""
-        if not self.layout.arm(robot).robot.native_agent.tcp_links:
-            return state.tcp_offset(robot, body)
-        return state.position(body) - self.agent_tcp_pose(state, robot)[:, :3]
-
-    def agent_tcp_distance(self, state: State, robot: str, body: str) -> Floats:
-        """Return the distance from native's ``agent.tcp_pose`` to a body's origin, (N,) (m)."""
-        if not self.layout.arm(robot).robot.native_agent.tcp_links:
-            return state.tcp_distance(robot, body)
-        return norm(self.agent_tcp_offset(state, robot, body))
-
     def agent_is_static(self, state: State, robot: str, threshold: float) -> Flags:
         """Return native's ``agent.is_static(threshold)``, (N,) bool (rad/s)."""
         descriptor = self.layout.arm(robot).robot

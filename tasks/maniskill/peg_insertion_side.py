@@ -24,7 +24,7 @@ from tasks import (
     transform,
 )
 from tasks.maniskill.clone import Clone
-from tasks.maths import Array, Floats, concatenate, maximum, norm, stack, tanh, where
+from tasks.maths import Array, Floats, concatenate, maximum, norm, tanh, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/peg_insertion_side.py (m, rad)
 HALF_LENGTH = (0.085, 0.125)  # of the peg, and of the box along the hole: smallest, largest
@@ -172,8 +172,11 @@ class PegInsertionSide(Clone):
 
         # Where the peg's middle is when its head is at the hole's centre
         goal = concatenate((transform(hole, -self.memory.head), hole[:, 3:]), 1)
-        ends = stack((self._head_position(state), peg[:, :3]))
-        head_off, middle_off = norm(transform(inverse(goal), ends)[..., 1:])
+        to_goal = inverse(goal)
+        head_off, middle_off = (
+            norm(transform(to_goal, point)[:, 1:])
+            for point in (self._head_position(state), peg[:, :3])
+        )
         astray = 0.5 * (head_off + middle_off) + 4.5 * maximum(head_off, middle_off)
         line_up = 3.0 * (1.0 - tanh(astray))
         aligned = (head_off < ALIGNED) & (middle_off < ALIGNED)

@@ -17,7 +17,7 @@ from tasks import (
     register_task,
 )
 from tasks.maniskill.clone import Clone
-from tasks.maths import Array, Floats, where
+from tasks.maths import Array, Floats, norm, where
 
 # mani_skill 3.0.1, envs/tasks/tabletop/pick_cube.py
 STATIC_SPEED = 0.2  # rad/s
@@ -77,19 +77,20 @@ class PickCube(Clone):
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """Grasp, TCP, goal and cube."""
+        tcp = self.agent_tcp_pose(state, "arm")
         return {
             "is_grasped": info["is_grasped"],
-            "tcp_pose": self.agent_tcp_pose(state, "arm"),
+            "tcp_pose": tcp,
             "goal_pos": state.position("goal_site"),
             "obj_pose": state.pose("cube"),
-            "tcp_to_obj_pos": self.agent_tcp_offset(state, "arm", "cube"),
+            "tcp_to_obj_pos": state.position("cube") - tcp[:, :3],
             "obj_to_goal_pos": state.offset("cube", "goal_site"),
         }
 
     def dense_reward(self, state: State, action: Floats, info: Info) -> Floats:
         """Reach (1), grasp (1), place (1), hold still (1); 5 on success."""
         reach, place, still = closeness(
-            self.agent_tcp_distance(state, "arm", "cube"),
+            norm(state.position("cube") - self.agent_tcp_pose(state, "arm")[:, :3]),
             state.distance("cube", "goal_site"),
             self.agent_speed(state, "arm", fingers=True),
         )
