@@ -47,13 +47,15 @@ def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
     Returns:
         Shape (N,), bool.
     """
-    held = np.logical_and.reduce(np.logical_or.reduce(forces != 0, 2), 0)
-    touched = np.flatnonzero(held).tolist()  # angles cost much, and few worlds need them
-    unclear = touched
+    rows = forces.tolist()
+    touched = [env for env, both in enumerate(zip(*rows, strict=True)) if all(map(any, both))]
+    held = np.zeros(forces.shape[1], bool)
+    unclear = touched  # angles cost much, and few worlds need them
     if len(touched) <= FEW:
         unclear = []
         for env in touched:
-            clear = _clearly_held(fingers, forces[:, env], [pose[env] for pose in poses])
+            pressing = [own[env] for own in rows]
+            clear = _clearly_held(fingers, pressing, [pose[env].tolist() for pose in poses])
             if clear is None:
                 unclear.append(env)
             else:
@@ -65,17 +67,19 @@ def grasped(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> Flags:
     return held
 
 
-def _clearly_held(fingers: Fingers, forces: Floats, poses: Sequence[Floats]) -> bool | None:
+def _clearly_held(
+    fingers: Fingers, forces: Sequence[Sequence[float]], poses: Sequence[Sequence[float]]
+) -> bool | None:
     """Tell whether two fingers hold a body in one world; None if that is near a threshold.
 
     Args:
         fingers: Which way they open, and the thresholds.
-        forces: Force on each finger, shape (2, 3) (N, world frame).
+        forces: Force on each finger, each (3,) (N, world frame).
         poses: Pose of each finger link, each (7,).
     """
     clear: bool | None = True
-    for limits, force, pose in zip(_thresholds(fingers), forces.tolist(), poses, strict=True):
-        one = _clearly_presses(limits, force, pose.tolist())
+    for limits, force, pose in zip(_thresholds(fingers), forces, poses, strict=True):
+        one = _clearly_presses(limits, force, pose)
         if one is False:
             return False
         clear = clear and one

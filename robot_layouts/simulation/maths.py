@@ -147,17 +147,17 @@ def counted(x: Array, count: int) -> Any:
 
 
 def columns(x: Array, numbers: tuple[tuple[int, ...], ...] | NDArray[np.intp]) -> Any:
-    """Return columns of ``x``, (N, k), by their numbers, (i, j); shape (N, i, j)."""
+    """Return columns of ``x``, (..., k), by their numbers, (i, j); shape (..., i, j)."""
     if isinstance(x, Tensor):
-        return x[:, torch.as_tensor(numbers, device=x.device)]
-    return x.take(numbers if isinstance(numbers, np.ndarray) else _places(numbers), 1)
+        return x[..., torch.as_tensor(numbers, device=x.device)]
+    return x.take(numbers if isinstance(numbers, np.ndarray) else _places(numbers), -1)
 
 
 def added(x: Array) -> Any:
-    """Return the sums of four along the second axis, added one after the other; (N, 4, …)."""
+    """Return the sums of four along the last axis but one, added one after the other."""
     if isinstance(x, Tensor):
-        return x[:, 0] + x[:, 1] + x[:, 2] + x[:, 3]
-    return np.add.accumulate(x, 1)[:, 3]
+        return x[..., 0, :] + x[..., 1, :] + x[..., 2, :] + x[..., 3, :]
+    return np.add.accumulate(x, -2)[..., 3, :]
 
 
 def floats(x: Array) -> Any:
@@ -177,13 +177,7 @@ def copy(x: Array) -> Any:
 
 def tanh(x: Array) -> Any:
     """Return torch's hyperbolic tangents."""
-    if isinstance(x, Tensor):
-        return x.tanh()
-    if not x.flags.c_contiguous:
-        return torch.from_numpy(x).tanh().numpy()
-    tangents = x.copy()  # where torch writes, NumPy need not take its tensor back
-    torch.from_numpy(tangents).tanh_()
-    return tangents
+    return _each(x, Tensor.tanh, Tensor.tanh_)
 
 
 def closeness(x: Array, steepness: float) -> Any:
@@ -195,16 +189,14 @@ def closeness(x: Array, steepness: float) -> Any:
     return number(1.0) - tangents
 
 
-@by_torch
-def exp(x: Any) -> Any:
+def exp(x: Array) -> Any:
     """Return torch's exponentials."""
-    return x.exp()
+    return _each(x, Tensor.exp, Tensor.exp_)
 
 
-@by_torch
-def log(x: Any) -> Any:
+def log(x: Array) -> Any:
     """Return torch's natural logarithms."""
-    return x.log()
+    return _each(x, Tensor.log, Tensor.log_)
 
 
 def sqrt(x: Array | Tensor) -> Any:
@@ -215,22 +207,22 @@ def sqrt(x: Array | Tensor) -> Any:
     """
     if is_portable():
         return x.double().sqrt().type(x.dtype) if isinstance(x, Tensor) else np.sqrt(x)
-    return x.sqrt() if isinstance(x, Tensor) else torch.from_numpy(x).sqrt().numpy()
+    return _each(x, Tensor.sqrt, Tensor.sqrt_)
 
 
 def cos(x: Array) -> Any:
     """Return torch's cosines (of rad)."""
-    return x.cos() if isinstance(x, Tensor) else torch.from_numpy(x).cos().numpy()
+    return _each(x, Tensor.cos, Tensor.cos_)
 
 
 def sin(x: Array) -> Any:
     """Return torch's sines (of rad)."""
-    return x.sin() if isinstance(x, Tensor) else torch.from_numpy(x).sin().numpy()
+    return _each(x, Tensor.sin, Tensor.sin_)
 
 
 def arccos(x: Array) -> Any:
     """Return torch's arc cosines (rad)."""
-    return x.arccos() if isinstance(x, Tensor) else torch.from_numpy(x).arccos().numpy()
+    return _each(x, Tensor.arccos, Tensor.arccos_)
 
 
 def arctan2(y: Array, x: Array) -> Any:
@@ -240,8 +232,10 @@ def arctan2(y: Array, x: Array) -> Any:
     """
     if isinstance(y, Tensor):
         return torch.stack([torch.atan2(a, b) for a, b in zip(y, _any(x), strict=True)])
-    rows = zip(torch.from_numpy(y).unbind(), torch.from_numpy(x).unbind(), strict=True)
-    return np.array([torch.atan2(a, b).item() for a, b in rows], y.dtype)
+    angles = y.copy()
+    for a, b in zip(torch.from_numpy(angles).unbind(), torch.from_numpy(x).unbind(), strict=True):
+        a.atan2_(b)
+    return angles
 
 
 def norm(x: Array) -> Any:
@@ -249,7 +243,9 @@ def norm(x: Array) -> Any:
     if isinstance(x, Tensor):
         return torch.linalg.vector_norm(x, dim=-1)
     rows = np.ascontiguousarray(x)  # else torch adds in another order than for a single row
-    return torch.linalg.vector_norm(torch.from_numpy(rows), dim=-1).numpy()
+    norms = np.empty(rows.shape[:-1], rows.dtype)
+    torch.linalg.vector_norm(torch.from_numpy(rows), dim=-1, out=torch.from_numpy(norms))
+    return norms
 
 
 @by_torch
@@ -297,6 +293,23 @@ def number(value: float) -> Any:
 def rounded(value: float) -> float:
     """Return the float32 nearest to a number."""
     return float(np.float32(value))
+
+
+def _each(
+    x: Array | Tensor, function: Callable[..., Tensor], in_place: Callable[..., Tensor]
+) -> Any:
+    """Return what a function of torch makes of every number.
+
+    Where it writes in place, NumPy need not take a tensor back, which takes as long as the function
+    does.
+    """
+    if isinstance(x, Tensor):
+        return function(x)
+    if x.dtype.kind != "f":  # whole numbers, which have no place for what is between them
+        return function(torch.from_numpy(x)).numpy()
+    values = x.copy()
+    in_place(torch.from_numpy(values))
+    return values
 
 
 @lru_cache(maxsize=4096)

@@ -7,6 +7,7 @@ from itertools import compress
 from typing import Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.simulation.backend import Backend, Built, BuiltRobot, Pair, Velocity
@@ -131,7 +132,8 @@ class ReadoutIndex:
         joints: Places of each robot's joints, in layout order.
         arm_joints: Places of each robot's joints that are not its gripper's.
         fingers: Each robot's grasping links.
-        grippers: Places of each robot's gripper joints, and the sum of their upper limits (m).
+        grippers: Places of each robot's gripper joints, and the sum of their upper limits (m); None
+            if it has no gripper.
         bases: Frame of each robot's root link.
         loaded_order: For each robot `BuiltRobot.loaded_order`, or None if it is the descriptor's.
         mean_frames: For each frame that lies between or beside links: the frame that orients it,
@@ -154,14 +156,14 @@ class ReadoutIndex:
         self.joints: Places[slice | list[int]] = Places(_ROBOT)
         self.arm_joints: Places[slice | list[int]] = Places(_ROBOT)
         self.fingers: Places[Fingers | None] = Places(_ROBOT)
-        self.grippers: Places[tuple[list[int], np.float32]] = Places(_ROBOT)
+        self.grippers: Places[tuple[slice | list[int], np.float32] | None] = Places(_ROBOT)
         self.bases: Places[int] = Places(_ROBOT)
         self.loaded_order: Places[list[int] | None] = Places(_ROBOT)
         self.mean_frames: list[MeanFrame] = []
         self.pairs = FramePairs()
         self.velocities: Declared[Velocity] = Declared()
         self.forces: Declared[Pair] = Declared()
-        self._grasps: dict[tuple[str, str], list[int]] = {}
+        self._grasps: dict[tuple[str, str], NDArray[np.intp]] = {}
         self._owners: Places[str] = Places(_ROBOT)
         for name, placement in layout.items():
             self._add_robot(name, placement.robot, built.robots[name])
@@ -179,13 +181,13 @@ class ReadoutIndex:
         self.bodies.expect(body)
         return self.forces.number(Pair(self._owners[robot], link, body))
 
-    def grasp(self, robot: str, body: str) -> list[int]:
+    def grasp(self, robot: str, body: str) -> NDArray[np.intp]:
         """Return the numbers of the forces of a body on both fingers of a robot that has some."""
         found = self._grasps.get((robot, body))
         if found is None:
             fingers = self.fingers[robot]
             links = () if fingers is None else fingers.links
-            found = [self.force(robot, link, body) for link in links]
+            found = np.array([self.force(robot, link, body) for link in links], np.intp)
             self._grasps[robot, body] = found
         return found
 
@@ -228,7 +230,8 @@ class ReadoutIndex:
         self.arm_joints[name] = _as_slice(list(compress(joints, arm)))
         gripper = [descriptor.joints.index(joint) for joint in descriptor.gripper_joints]
         widest = np.float32(sum(limits[gripper, 1]))
-        self.grippers[name] = [joints[i] for i in gripper], widest
+        places = _as_slice([joints[i] for i in gripper])
+        self.grippers[name] = (places, widest) if gripper else None
         self.fingers[name] = descriptor.fingers
         self.tcps[name] = self._tcp_frame(self.links[owner], descriptor)
 
@@ -265,23 +268,23 @@ class FramePairs:
     subtraction and one norm over all pairs.
 
     Attributes:
-        starts: First frame of every pair, (K,).
-        ends: Second frame of every pair, (K,).
+        frames: Last and first frame of every pair, (2, K).
         planar: Numbers of the pairs whose distance is seen from above.
     """
 
     def __init__(self) -> None:
         """Start without pairs."""
         self._places: dict[tuple[int, int, bool], int] = {}
-        self.starts = self.ends = self.planar = np.empty(0, np.intp)
+        self.frames = np.empty((2, 0), np.intp)
+        self.planar: slice | list[int] = []
 
     def place(self, start: int, end: int, *, planar: bool) -> int:
         """Return the number of a pair, adding it if it is new."""
         found = self._places.get((start, end, planar))
         if found is None:
             found = self._places[start, end, planar] = len(self._places)
-            self.starts, self.ends, planar_flags = np.array(list(self._places), np.intp).T
-            self.planar = np.flatnonzero(planar_flags)
+            self.frames = np.array([(last, first) for first, last, _ in self._places], np.intp).T
+            self.planar = _as_slice([k for k, (_, _, flat) in enumerate(self._places) if flat])
         return found
 
 

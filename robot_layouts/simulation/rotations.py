@@ -33,8 +33,8 @@ def rotation_matrix(quaternion: Floats) -> Floats:
     Returns:
         Shape (N, 3, 3), float32; column i is the frame's axis i in the world.
     """
-    # Sums of four depend on their order, so torch adds.
-    scale = _TWO / torch.from_numpy(quaternion * quaternion).sum(-1, keepdim=True).numpy()
+    # Sums of four depend on their order: torch, too, adds one after the other.
+    scale = _TWO / np.add.accumulate(quaternion * quaternion, 1)[:, 3:]
     products = (quaternion[:, :, None] * quaternion[:, None, :]).reshape(len(quaternion), 16)
     entries: Floats = scale * (products.take(_FIRST, 1) + _SIGN * products.take(_SECOND, 1))
     entries[:, ::4] = _ONE - entries[:, ::4]

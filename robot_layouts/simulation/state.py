@@ -283,9 +283,10 @@ class State:
     @_remembered
     def gripper_opening(self, robot: str) -> Floats:
         """How far a robot's gripper is open, shape (N,): 0 closed, 1 wide open, 1 without one."""
-        joints, widest = self._index.grippers[robot]
-        if not joints:
+        gripper = self._index.grippers[robot]
+        if gripper is None:
             return np.ones(self.num_envs, np.float32)
+        joints, widest = gripper
         return np.add.reduce(self.joint_positions[:, joints], 1) / widest
 
     @_remembered
@@ -333,7 +334,7 @@ class State:
         if max_angle is not None:
             fingers = _within(fingers, max_angle)
         poses = [self.link_pose(robot, link) for link in fingers.links]
-        return grasped(fingers, forces[pairs], poses)
+        return grasped(fingers, forces.take(pairs, 0), poses)
 
     # -- distances ---------------------------------------------------------------------------
 
@@ -366,16 +367,28 @@ class State:
     def _distance(self, start: int, end: int, *, planar: bool = False) -> Floats:
         place = self._index.pairs.place(start, end, planar=planar)
         if place >= len(self._distances):
-            self._distances = norm(self._all_offsets(place))
+            self._measure()
         return self._distances[place]
+
+    def _measure(self) -> None:
+        """Take all distances and speeds that were ever asked for; norms cost little but the call.
+
+        Those speeds are left out whose velocities were not read in time.
+        """
+        ways = self._all_offsets(self._index.pairs.frames.shape[1] - 1)
+        velocities = self._velocities
+        if not self._moment.past:
+            velocities = self._all_velocities(len(self._index.velocities.keys) - 1)
+        lengths = norm(concatenate([rows for rows in (ways, velocities) if len(rows)]))
+        self._distances, self._speeds = lengths[: len(ways)], lengths[len(ways) :]
 
     def _all_offsets(self, place: int) -> Floats:
         """Offsets of all pairs that were ever asked for, (K, N, 3), at least up to ``place``."""
         if place >= len(self._offsets):
             pairs = self._index.pairs
-            ways = self.all_poses.take(pairs.ends, 0) - self.all_poses.take(pairs.starts, 0)
-            if len(pairs.planar):
-                ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
+            ends, starts = self.all_poses.take(pairs.frames, 0)
+            ways = ends - starts
+            ways[pairs.planar, :, 2] = 0.0  # exact: a zero adds nothing to a norm
             self._offsets = ways[:, :, :3]
         return self._offsets
 
@@ -386,7 +399,8 @@ class State:
     def _speed(self, body: str, kind: Literal["linear", "angular"]) -> Floats:
         place = self._index.velocity(body, kind)
         if place >= len(self._speeds):
-            self._speeds = norm(self._all_velocities(place))
+            self._all_velocities(place)
+            self._measure()
         return self._speeds[place]
 
     def _all_velocities(self, place: int) -> Floats:

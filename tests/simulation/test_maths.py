@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 import torch
 
-from robot_layouts.simulation.maths import added, arctan2, closeness, norm, tanh
+from robot_layouts.simulation.maths import (
+    added,
+    arccos,
+    arctan2,
+    closeness,
+    cos,
+    exp,
+    log,
+    norm,
+    sin,
+    sqrt,
+    tanh,
+)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -20,13 +32,19 @@ def test_closeness_is_one_less_the_hyperbolic_tangent(shape, dtype):
     assert torch.equal(closeness(torch.from_numpy(x), 5.0), torch.from_numpy(exact))
 
 
-def test_tangents_leave_what_they_are_of_as_it_is():
-    x = np.random.default_rng(0).uniform(-2, 2, (3, 4)).astype(np.float32)
+@pytest.mark.parametrize("function", [arccos, cos, exp, log, sin, sqrt, tanh])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_functions_of_each_number_are_torchs_and_leave_their_argument_as_it_is(function, dtype):
+    x = np.random.default_rng(0).uniform(0, 1, (30, 40)).astype(dtype)
     before = x.copy()
-    for rows in (x, x[:, ::2]):
-        assert np.array_equal(tanh(rows), torch.from_numpy(rows).tanh().numpy())
-        closeness(rows, 5.0)
+    torchs = getattr(torch, function.__name__)
+    for rows in (x, x[:1, 0], x[0], x[:, 0], x[:, ::2], x.T):
+        ours = function(rows)
+        assert ours.dtype == dtype
+        np.testing.assert_array_equal(ours, torchs(torch.from_numpy(rows)).numpy())
     np.testing.assert_array_equal(x, before)
+    whole = np.ones(2, int)
+    np.testing.assert_array_equal(function(whole), torchs(torch.from_numpy(whole)).numpy())
 
 
 @pytest.mark.parametrize("count", [1, 2, 9])
@@ -41,7 +59,9 @@ def test_four_are_added_one_after_the_other(count):
 def test_arc_tangents_are_those_of_single_numbers():
     y, x = np.random.default_rng(0).normal(size=(2, 40)).astype(np.float32)
     single = [torch.atan2(*pair) for pair in zip(*map(torch.from_numpy, (y, x)), strict=True)]
+    before = y.copy()
     np.testing.assert_array_equal(arctan2(y, x), torch.stack(single).numpy())
+    np.testing.assert_array_equal(y, before)
 
 
 def test_norms_of_chosen_columns_are_those_of_single_rows():

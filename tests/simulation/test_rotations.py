@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+import torch
 
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.rotations import last_euler_angle, rotation_matrix
@@ -22,6 +23,16 @@ def test_matrices_are_rotations():
     identity = np.broadcast_to(np.eye(3), (100, 3, 3))
     np.testing.assert_allclose(matrices @ matrices.transpose(0, 2, 1), identity, atol=1e-6)
     np.testing.assert_allclose(np.linalg.det(matrices), 1, rtol=1e-5)
+
+
+@pytest.mark.parametrize("count", [1, 2, 8, 33, 1000])
+def test_squares_are_added_as_torch_adds_them(count):
+    quaternions = random_quaternions(count)
+    scale = 2.0 / torch.from_numpy(quaternions * quaternions).sum(-1).numpy()
+    x, y = quaternions[:, 1], quaternions[:, 2]
+    np.testing.assert_array_equal(
+        rotation_matrix(quaternions)[:, 2, 2], 1.0 - scale * (x * x + y * y)
+    )
 
 
 def test_a_quarter_turn_about_each_axis_carries_the_next_axis_into_the_one_after():

@@ -6,6 +6,7 @@ import tasks
 from layouts import single
 from robot_layouts.simulation import Simulation, State
 from robot_layouts.simulation.checks.overlaps import empty, stand
+from robot_layouts.simulation.maths import norm
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError, UnknownNameError
 from tasks import TaskEnv
@@ -83,6 +84,34 @@ def test_velocities_are_read_while_the_state_is_present(env: TaskEnv):
     assert read.linear_velocity("cube").tolist() == before
     with pytest.raises(SimulationError, match="no longer the present one"):
         unread.linear_velocity("cube")
+
+
+def test_lengths_that_are_taken_together_are_those_of_single_rows(env: TaskEnv):
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(torch.full((2, 15), 0.7))
+    state = state_of(env)
+    for _ in range(2):  # the second state takes all of them together
+        spin, speed = state.spin("cube"), state.speed("cube")
+        away = state.distance("cube", "goal_site")
+        aside = state.planar_distance("cube", "goal_site")
+        for env_id in range(2):
+            row = slice(env_id, env_id + 1)
+            assert norm(state.angular_velocity("cube")[row]) == spin[row] > 0
+            assert norm(state.linear_velocity("cube")[row]) == speed[row] > 0
+            assert norm(state.offset("cube", "goal_site")[row]) == away[row] > 0
+            assert norm(state.offset("cube", "goal_site")[row, :2]) == aside[row] > 0
+        state = state_of(env)
+
+
+def test_distances_outlast_the_speeds_that_are_asked_for_with_them(env: TaskEnv):
+    state_of(env).speed("cube")
+    unread = state_of(env)
+    away = state_of(env).distance("cube", "goal_site").tolist()
+    env.step(torch.zeros(2, 15))
+    assert unread.distance("cube", "goal_site").tolist() == away
+    with pytest.raises(SimulationError, match="no longer the present one"):
+        unread.speed("cube")
 
 
 def test_a_remembered_answer_is_that_of_the_same_question(env: TaskEnv):

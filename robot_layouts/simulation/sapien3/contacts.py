@@ -17,7 +17,6 @@ from robot_layouts.simulation.sapien3.world import BuiltWorld
 
 _Table = dict[tuple[int, int], tuple[int, int]]
 _NOTHING = (0.0, 0.0, 0.0)
-_STILL = np.zeros(3, np.float32)
 
 
 class PairForces:
@@ -63,10 +62,11 @@ def _impulses(contacts: Sequence[Any], table: _Table) -> dict[int, list[float]]:
         found = table.get((id(first), id(second)))
         if found is None:
             continue
-        # As native does: the points of a contact in float32, contacts in float64.
-        total = reduce(add, [point.impulse for point in contact.points], _STILL).tolist()
-        if any(total):  # most are of bodies that are only near
-            pair, sign = found
+        points = [point.impulse for point in contact.points]
+        pressing = [impulse for impulse in points if any(impulse.tolist())]
+        if pressing:  # most are of bodies that are only near
+            # As native does: the points of a contact in float32, contacts in float64.
+            (pair, sign), total = found, reduce(add, pressing).tolist()
             so_far = impulses.get(pair, _NOTHING)
             impulses[pair] = [a + sign * b for a, b in zip(so_far, total, strict=True)]
     return impulses
