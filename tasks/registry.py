@@ -51,7 +51,7 @@ CATALOGUE = {
 
 TaskClass = TypeVar("TaskClass", bound="type[MultiRobotTask]")
 
-_listeners: list[Callable[[], None]] = []
+_listeners: list[Callable[[Iterable[str]], None]] = []
 
 
 def _native_name(name: str) -> str:
@@ -121,21 +121,21 @@ def register_task(*names: str) -> Callable[[TaskClass], TaskClass]:
         cls.native_id = names[0] if any(map(_is_native_name, names)) else None
         TASKS.register(names[0], cls, names[1:])
         for listener in _listeners:
-            listener()
+            listener(names[:1])
         return cls
 
     return register
 
 
-def on_registration(listener: Callable[[], None]) -> None:
-    """Call a function now, and whenever a task has been registered."""
+def on_registration(listener: Callable[[Iterable[str]], None]) -> None:
+    """Call a function with every task id now, and with each that is registered later."""
     _listeners.append(listener)
-    listener()
+    listener(list_tasks())
 
 
 def list_tasks() -> tuple[str, ...]:
     """Return every task id, sorted."""
-    return tuple(TASKS)
+    return tuple(iter(TASKS))  # a mapping's length, too, takes a look at every installed package
 
 
 def list_own() -> tuple[str, ...]:

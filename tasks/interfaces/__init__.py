@@ -6,12 +6,12 @@ Importing this loads neither torch nor sapien; each front is loaded when one is 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from robots import MissingPackageError
 from tasks.interfaces.spec import NAMESPACE, TaskSpec
-from tasks.registry import list_own, list_tasks
+from tasks.registry import list_own
 
 if TYPE_CHECKING:
     from tasks.interfaces.lerobot import LeRobotTask
@@ -23,17 +23,21 @@ _GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
 __all__ = ["NAMESPACE", "lerobot_vec_env", "parallel_env", "register", "sb3_vec_env"]
 
 
-def register() -> None:
-    """Tell Gymnasium every task of `tasks.list_tasks` that it does not know yet.
+def register(task_ids: Iterable[str]) -> None:
+    """Tell Gymnasium tasks that it does not know yet.
 
-    Importing `tasks` does this, and so does registering a task. Names that are no Gymnasium ids
-    (those end with ``-v`` and a number) stay unknown to it. Tasks of a user's own module go by
-    their plain id, too, unless it is taken: so ``gymnasium.make("mylab.tray:TwoArmTray-v1")``,
-    which imports the module and looks the id up, finds them.
+    Importing `tasks` does this with all that there are, and registering a task with that one. Names
+    that are no Gymnasium ids (those end with ``-v`` and a number) stay unknown to it. Tasks of a
+    user's own module go by their plain id, too, unless it is taken: so
+    ``gymnasium.make("mylab.tray:TwoArmTray-v1")``, which imports the module and looks the id up,
+    finds them.
+
+    Args:
+        task_ids: Ids of the tasks.
     """
     from gymnasium import registry
 
-    names = {f"{NAMESPACE}/{task_id}": task_id for task_id in list_tasks()}
+    names = {f"{NAMESPACE}/{task_id}": task_id for task_id in task_ids}
     names |= {task_id: task_id for task_id in list_own()}
     for name, task_id in names.items():
         if _GYMNASIUM_NAME.fullmatch(task_id) and name not in registry:

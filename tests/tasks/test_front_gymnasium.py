@@ -120,7 +120,7 @@ def test_ids_follow_the_list_of_tasks():
 
 
 def test_registering_twice_warns_of_nothing(recwarn):
-    interfaces.register()
+    interfaces.register(tasks.list_tasks())
     assert not list(recwarn)
 
 

@@ -186,7 +186,7 @@ class SapienBackend:
         self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
     ) -> PinocchioFollower:
         """Return what follows poses of a link; see `Backend`."""
-        urdf = self._blueprints[robot].text
+        urdf = self._blueprints[robot].contents
         return PinocchioFollower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
 
     def contact_counts(self) -> NDArray[np.int64]:

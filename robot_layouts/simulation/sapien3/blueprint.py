@@ -7,34 +7,32 @@ model has let through, and what it built is compared with that model.
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import sapien
 import sapien.physx as physx
-from sapien.wrapper.urdf_loader import URDFLoader
+from sapien.wrapper.articulation_builder import MimicJointRecord
 
-from robot_layouts.simulation.sapien3.collision_groups import NO_FLOOR_CONTACT, USUAL, overlap_words
+from robot_layouts.simulation.sapien3.builder import make_builder
+from robot_layouts.simulation.sapien3.collision_groups import (
+    NO_FLOOR_CONTACT,
+    USUAL,
+    common_bits,
+    overlap_words,
+)
 from robots import AssetError, RobotDescriptor, UnknownNameError
-from robots.urdf.mesh_files import has_body, load_scene, read_corners
-from robots.urdf.model import UrdfModel, UrdfShape
+from robots.urdf.mesh_files import has_body, load_scene
+from robots.urdf.model import ModelJoint, UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
 from robots.urdf.reading import read_model
 from robots.urdf.srdf import ExcludedPair, read_excluded_pairs
 from robots.urdf.summary import parse_urdf, read_urdf
 
-MOST_PAIRS = 31  # that SAPIEN's loader can keep apart: a bit each
-
-# What physics and pictures need of a URDF; SAPIEN stumbles over some of the rest.
-ELEMENTS = ("link", "joint", "material")
-JOINT_PARTS = ("parent", "child", "origin", "axis")
-MOVING_PARTS = (*JOINT_PARTS, "limit", "dynamics", "mimic")
-DEFAULTS = {"limit": ("lower", "upper"), "dynamics": ("damping", "friction")}  # 0, if left out
+MOST_PAIRS = 31  # that SAPIEN's URDF loader, and so native, keeps apart: a bit each
 
 
 @dataclass
@@ -44,20 +42,21 @@ class Blueprint:
     Attributes:
         urdf: Its URDF.
         model: What that describes.
-        text: Its XML, as far as SAPIEN takes it.
+        contents: Its XML.
         builder: SAPIEN's builder of an articulation.
-        overlaps: Word 2 of the collision groups of links that may overlap others; None where
-            SAPIEN's loader has set them.
+        overlaps: Word 2 of the collision groups of links that may overlap others.
+        from_srdf: Whether an SRDF says which may, and not the descriptor.
         no_floor_contact: Links that floors let through.
         checked: Whether an articulation that it built was compared with the model.
     """
 
     urdf: Path
     model: UrdfModel
-    text: str
+    contents: bytes
     builder: Any
-    overlaps: dict[str, int] | None = None
-    no_floor_contact: tuple[str, ...] = ()
+    overlaps: dict[str, int]
+    from_srdf: bool
+    no_floor_contact: tuple[str, ...]
     checked: bool = False
 
     def build(
@@ -69,8 +68,8 @@ class Blueprint:
             scene: SAPIEN's scene.
             pose: Of its base.
             number: Which of the scene's robots it is.
-            links_pass: Whether its links pass through those of other robots where SAPIEN's loader
-                lets them: it numbers the pairs that may overlap in each robot from 1.
+            links_pass: Whether its links pass through those of other robots where SAPIEN's URDF
+                loader lets them: it gives the pairs of each robot's SRDF the same bits.
 
         Raises:
             AssetError: If SAPIEN left out a collision shape.
@@ -80,13 +79,10 @@ class Blueprint:
         for link in self.builder.link_builders:
             for record in link.visual_records:
                 record.material = _copied(record.material)
-        own = number + 1 if self.overlaps is not None or not links_pass else 0
+        own = 0 if self.from_srdf and links_pass else number + 1
         for link in self.builder.link_builders:
             words = NO_FLOOR_CONTACT if link.name in self.no_floor_contact else USUAL
-            overlaps = link.collision_groups[2]
-            if self.overlaps is not None:
-                overlaps = self.overlaps.get(link.name, 0)
-            link.collision_groups = [*words, overlaps, own]
+            link.collision_groups = [*words, self.overlaps.get(link.name, 0), own]
         articulation = self.builder.build()
         self.builder.set_scene(None)  # else it would keep the scene alive
         articulation.set_root_pose(pose)
@@ -118,66 +114,20 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
                 f"link in no_floor_contact of {descriptor.name}", link, model.links
             )
     _expect_meshes(model, urdf, visuals=visuals)
-    loader: Any = _TextLoader()
-    loader.set_scene(sapien.Scene([]))  # which hands out empty builders and is not built in
-    loader.fix_root_link = True
-    if material := descriptor.gripper_material:
-        friction = material.static_friction, material.dynamic_friction, material.restitution
-        for link in material.links:
-            loader.set_link_material(link, *friction)
-            loader.set_link_patch_radius(link, material.patch_radius)
-            loader.set_link_min_patch_radius(link, material.patch_radius)
-    text = _for_sapien(contents, urdf.as_posix(), visuals=visuals)
-    own = descriptor.allowed_collisions is not None
-    overlaps = overlap_words(descriptor, model, urdf) if own else None
-    pairs = [] if own else _pairs(read_excluded_pairs(urdf), model, urdf)
-    try:
-        builder = loader.load_text(text, urdf, pairs)
-    except Exception as error:  # SAPIEN's parser raises whatever it meets
-        raise AssetError(
-            f"SAPIEN cannot read {urdf}: {str(error) or type(error).__name__}"
-        ) from error
-    tendons = builder.mimic_joint_records
-    builder.mimic_joint_records = [t for t in tendons if _needs_tendon(t, descriptor, model)]
-    return Blueprint(urdf, model, text, builder, overlaps, descriptor.no_floor_contact)
-
-
-class _TextLoader(URDFLoader):
-    """A URDF loader that takes text, and finds every mesh that a locator found.
-
-    SAPIEN's own drops meshes of a ``package://`` whose folder has another name, saying so only in
-    its log.
-    """
-
-    def load_text(self, text: str, urdf: Path, pairs: list[set[str]]) -> Any:
-        """Return a builder for the one articulation of a URDF.
-
-        Args:
-            text: The URDF's XML.
-            urdf: Its path, for what it refers to.
-            pairs: Links that may overlap.
-        """
-        self.package_dir = None
-        self.urdf, self.urdf_dir = urdf.as_posix(), str(urdf.parent)
-        self.ignore_pairs = pairs
-        builders, actors, _ = self._parse_urdf(text)
-        if len(builders) != 1 or actors:
-            raise AssetError(f"{urdf} describes no single robot with joints")
-        return builders[0]
-
-    def _build_link(self, link: Any, link_builder: Any) -> None:
-        for part in (*link.collisions, *link.visuals):
-            mesh = part.geometry.mesh
-            if mesh is not None:
-                mesh.filename = resolve(mesh.filename, self.urdf, os.path.isfile)
-        for part in link.collisions:
-            mesh = part.geometry.mesh
-            if mesh is not None and mesh.scale is not None and min(mesh.scale) < 0:
-                where = f"{self.urdf}, link {link.name!r}"
-                scale = tuple(mesh.scale.tolist())
-                mesh.filename = unmirrored(mesh.filename, scale, where, self.urdf)
-                mesh.scale = None
-        super()._build_link(link, link_builder)
+    from_srdf = descriptor.allowed_collisions is None
+    if from_srdf:
+        overlaps = common_bits(_pairs(read_excluded_pairs(urdf), model, urdf))
+    else:
+        overlaps = overlap_words(descriptor, model, urdf)
+    root, material = parse_urdf(contents, urdf.as_posix()), descriptor.gripper_material
+    builder = make_builder(model, root, urdf.as_posix(), material, visuals=visuals)
+    builder.mimic_joint_records = [
+        MimicJointRecord(joint.name, joint.mimics, joint.multiplier, joint.offset)
+        for joint in model.ordered
+        if joint.mimics is not None and _needs_tendon(joint, descriptor, model)
+    ]
+    loose = descriptor.no_floor_contact
+    return Blueprint(urdf, model, contents, builder, overlaps, from_srdf, loose)
 
 
 def _copied(material: Any) -> Any:
@@ -189,53 +139,31 @@ def _copied(material: Any) -> Any:
     return own
 
 
-def _needs_tendon(mimic: Any, descriptor: RobotDescriptor, model: UrdfModel) -> bool:
+def _needs_tendon(joint: ModelJoint, descriptor: RobotDescriptor, model: UrdfModel) -> bool:
     """Tell whether SAPIEN should tie a joint to the one that it mimics.
 
     Its ties are far stiffer than most drives, pull along a chain, and then end in NaN or a crash.
     So a joint that has a drive of its own gets none, but for one beside its leader that moves just
     as it does: ManiSkill ties such fingers, and what clones it is equal to its last bit.
     """
-    parents = {joint.name: joint.parent for joint in model.joints}
-    alike = mimic.multiplier == 1 and mimic.offset == 0
-    beside = parents[mimic.joint] == parents[mimic.mimic]
-    return mimic.joint not in descriptor.joints or (alike and beside)
-
-
-@lru_cache(maxsize=64)
-def _for_sapien(xml: bytes, urdf: str, *, visuals: bool) -> str:
-    """Return a URDF's XML without what neither physics nor pictures use, and with defaults."""
-    root = parse_urdf(xml, urdf)
-    for element in list(root):
-        if element.tag not in ELEMENTS or (element.tag == "material" and not visuals):
-            root.remove(element)
-    for joint in root.iterfind("joint"):
-        used = JOINT_PARTS if joint.get("type") == "fixed" else MOVING_PARTS
-        for part in list(joint):
-            if part.tag not in used:
-                joint.remove(part)
-            for key in DEFAULTS.get(part.tag, ()):
-                part.set(key, part.get(key, "0"))
-    for link in root.iterfind("link") if not visuals else ():
-        for visual in link.findall("visual"):
-            link.remove(visual)
-    return ElementTree.tostring(root, encoding="unicode")
+    leader = next(other for other in model.joints if other.name == joint.mimics)
+    alike = joint.multiplier == 1 and joint.offset == 0
+    return joint.name not in descriptor.joints or (alike and joint.parent == leader.parent)
 
 
 def _pairs(excluded: Iterable[ExcludedPair], model: UrdfModel, urdf: Path) -> list[set[str]]:
-    """Return the pairs of an SRDF that physics leaves out, which SAPIEN takes by their reason."""
+    """Return the pairs of an SRDF that native's physics leaves out, which it takes by their reason.
+
+    PhysX by itself leaves out those that a joint joins.
+    """
     known = set(model.links)
-    pairs = [
-        set(pair.links)
-        for pair in excluded
-        if pair.reason.lower() == "default" and len(known & set(pair.links)) == 2
-    ]
     joined = [{joint.parent, joint.child} for joint in model.joints]
-    apart = sum(pair not in joined for pair in pairs)
-    if apart > MOST_PAIRS:
+    named = (set(pair.links) for pair in excluded if pair.reason.lower() == "default")
+    pairs = [pair for pair in named if len(known & pair) == 2 and pair not in joined]
+    if len(pairs) > MOST_PAIRS:
         raise AssetError(
-            f"the SRDF beside {urdf} leaves {apart} pairs of links out of collisions; SAPIEN can do"
-            f" so with {MOST_PAIRS} at most (a descriptor that names them itself, as"
+            f"the SRDF beside {urdf} leaves {len(pairs)} pairs of links out of collisions; SAPIEN"
+            f" can do so with {MOST_PAIRS} at most (a descriptor that names them itself, as"
             " allowed_collisions, may have more)"
         )
     return pairs
@@ -295,38 +223,3 @@ def _cannot_cook(shape: UrdfShape, urdf: Path) -> bool:
     except RuntimeError:
         return True
     return False
-
-
-def unmirrored(path: str, scale: tuple[float, ...], where: str, urdf: str) -> str:
-    """Return a mesh file that needs no scale, whose convex hull is that of another one scaled.
-
-    PhysX knows no convex bodies of negative scale: it builds them, and the process crashes where
-    two of them touch.
-
-    Args:
-        path: A mesh file.
-        scale: Its factors along x, y and z, some of them negative.
-        where: What refers to it, for messages.
-        urdf: The URDF that it belongs to.
-
-    Raises:
-        AssetError: If it cannot be read.
-    """
-    return _written(path, Path(path).stat().st_mtime_ns, scale, where, urdf)
-
-
-@lru_cache(maxsize=1024)
-def _written(path: str, _modified: int, scale: tuple[float, ...], where: str, urdf: str) -> str:
-    import trimesh
-
-    hull: Any = trimesh.convex.convex_hull(read_corners(path, scale, where, urdf))
-    folder = Path(_folder().name)
-    target = folder / f"{len(list(folder.iterdir()))}_{Path(path).stem}.stl"
-    hull.export(target)
-    return str(target)
-
-
-@cache
-def _folder() -> tempfile.TemporaryDirectory[str]:
-    """Return a folder that is removed when this process ends."""
-    return tempfile.TemporaryDirectory(prefix="robot-layouts-")

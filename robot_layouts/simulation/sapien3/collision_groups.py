@@ -8,6 +8,7 @@ and links that they let through have words 0 and 1 by which they collide with al
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from robots import AssetError, RobotDescriptor
@@ -47,9 +48,14 @@ def overlap_words(descriptor: RobotDescriptor, model: UrdfModel, urdf: Path) -> 
             f" other, and its allowed collisions take {len(cliques)}; allow fewer pairs, or all"
             " those of whole parts of the robot"
         )
+    return common_bits(cliques)
+
+
+def common_bits(sets: Iterable[set[str]]) -> dict[str, int]:
+    """Return word 2 of the links of sets, in each of which any two may overlap: a bit for each."""
     words = dict[str, int]()
-    for bit, clique in enumerate(cliques):
-        for link in clique:
+    for bit, links in enumerate(sets):
+        for link in links:
             words[link] = words.get(link, 0) | 1 << bit
     return words
 

@@ -7,7 +7,7 @@ numbers are rounded.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -19,9 +19,19 @@ from sapien.wrapper.pinocchio_model import PinocchioModel
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.sapien3.robot import SimulatedRobot
 from robots import DescriptorError, UnknownNameError
+from robots.urdf.checks import link_of
 
 _MAX_ITERATIONS = 100  # mani_skill 3.0.1, agents/controllers/utils/kinematics.py
 _GRAVITY = [0, 0, -9.81]  # as there; it moves nothing here
+
+# What Pinocchio reads of a joint, and what its parser insists on, 0 if left out; its search does
+# not use limits.
+_PARTS = ("parent", "child", "origin", "axis", "limit", "dynamics", "mimic")
+_FIXED_PARTS = _PARTS[:4]
+_DEFAULTS = {
+    "limit": ("lower", "upper", "effort", "velocity"),
+    "dynamics": ("damping", "friction"),
+}
 
 
 class PinocchioFollower:
@@ -30,7 +40,7 @@ class PinocchioFollower:
     def __init__(
         self,
         robot: SimulatedRobot,
-        urdf: str,
+        urdf: bytes,
         link: str,
         root_link: str | None,
         joints: Sequence[str],
@@ -39,7 +49,7 @@ class PinocchioFollower:
 
         Args:
             robot: The robot, for the order of its joints and links.
-            urdf: Its URDF.
+            urdf: Its URDF's contents.
             link: The link that is to follow.
             root_link: Link whose frame poses are in; the robot's root if None.
             joints: Those that may move.
@@ -95,15 +105,16 @@ class _Subtree:
         joints: Names of its joints.
     """
 
-    def __init__(self, urdf: str, root_link: str | None) -> None:
+    def __init__(self, urdf: bytes, root_link: str | None) -> None:
         root = ElementTree.fromstring(urdf)
-        self._above = {_end(joint, "child"): joint for joint in root.iterfind("joint")}
-        _complete_limits(self._above.values())
+        _leave_out(root)
+        self._above = {link_of(joint, "child"): joint for joint in root.iterfind("joint")}
         if root_link is not None:
             for element in list(root):
-                last = _end(element, "child") if element.tag == "joint" else element.get("name", "")
+                joint = element.tag == "joint"
+                last = link_of(element, "child") if joint else element.get("name", "")
                 beyond = root_link in self._links_above(last)
-                if not beyond or (element.tag == "joint" and last == root_link):
+                if not beyond or (joint and last == root_link):
                     root.remove(element)
         self.text = ElementTree.tostring(root, encoding="unicode")
         self.links = {link.get("name", "") for link in root.iterfind("link")}
@@ -121,20 +132,22 @@ class _Subtree:
         """Return a link and all that it hangs on."""
         chain = [link]
         while (joint := self._above.get(chain[-1])) is not None:
-            chain.append(_end(joint, "parent"))
+            chain.append(link_of(joint, "parent"))
         return chain
 
 
-def _end(joint: ElementTree.Element, which: str) -> str:
-    end = joint.find(which)
-    return "" if end is None else end.get("link", "")
-
-
-def _complete_limits(joints: Iterable[ElementTree.Element]) -> None:
-    """Give limits what Pinocchio's parser insists on, and the search makes no use of."""
-    for joint in joints:
-        if joint.find("limit") is None and joint.get("type") in ("revolute", "prismatic"):
-            ElementTree.SubElement(joint, "limit")
-        for limit in joint.iterfind("limit"):
-            for key in ("lower", "upper", "effort", "velocity"):
-                limit.set(key, limit.get(key, "0"))
+def _leave_out(root: ElementTree.Element) -> None:
+    """Leave out what Pinocchio does not read, some of which it stumbles over, and set defaults."""
+    for element in list(root):
+        if element.tag not in ("link", "joint"):
+            root.remove(element)
+    for link in root.iterfind("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    for joint in root.iterfind("joint"):
+        used = _FIXED_PARTS if joint.get("type") == "fixed" else _PARTS
+        for part in list(joint):
+            if part.tag not in used:
+                joint.remove(part)
+            for key in _DEFAULTS.get(part.tag, ()):
+                part.set(key, part.get(key, "0"))
