@@ -48,12 +48,21 @@ SLOW = (  # which native's shaders called "default" alone have
     "albedo+depth+none+normal+position+rgb+segmentation+state_dict",
 )
 SHADERS = {"shader_pack": "default"}  # native's sensor_configs for these
-WRISTS = {  # with another robot, whose wrist has a camera, or has none
-    "PickCube-v1": "panda_wristcam",
-    "PegInsertionSide-v1": "panda",
-    "PlugCharger-v1": "panda",
-    "StackCube-v1": "panda_wristcam",
-    "PushCube-v1": "panda_wristcam",
+OTHER_ROBOTS = {  # that native's task allows or a Panda stands for: a wrist with a camera, or none
+    **dict.fromkeys(("StackCube-v1", "StackPyramid-v1"), "panda"),
+    **dict.fromkeys(
+        (
+            "LiftPegUpright-v1",
+            "PickCube-v1",
+            "PlaceSphere-v1",
+            "PokeCube-v1",
+            "PullCube-v1",
+            "PullCubeTool-v1",
+            "PushCube-v1",
+            "RollBall-v1",
+        ),
+        "panda_wristcam",
+    ),
 }
 
 
@@ -264,7 +273,7 @@ def test_every_clone_observes_what_native_does_in_every_mode(task_id: str, modes
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("task_id", "robot"), WRISTS.items())
+@pytest.mark.parametrize(("task_id", "robot"), OTHER_ROBOTS.items())
 def test_clones_observe_what_native_does_with_other_robots_and_sizes(task_id: str, robot: str):
     modes = ("rgb+depth+segmentation+position+state_dict", "pointcloud", "sensor_data")
     sizes = {"width": 64, "height": 96}
