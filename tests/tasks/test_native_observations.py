@@ -253,8 +253,7 @@ def test_each_environment_is_shown_by_itself():
     both = as_picture("depth", np.concatenate([near, 3 * near]))
     for depth, shown in zip((near, 3 * near), both, strict=True):
         assert np.array_equal(as_picture("depth", depth)[0], shown)
-    assert shown.min() == 0
-    assert shown.max() == 255
+    assert (both.min(), both.max()) == (0, 255)
 
 
 # -- the whole table -------------------------------------------------------------------------
