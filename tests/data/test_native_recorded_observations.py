@@ -1,4 +1,4 @@
-"""What `replay --obs-mode` writes is what native's own recorder writes, and native's dataset reads."""
+"""What `replay --obs-mode` writes is what native writes, and native's dataset reads it."""
 
 import json
 from pathlib import Path
