@@ -86,7 +86,7 @@ class RobotSenses(Senses):
         env = tasks.make(recipe.task, **recipe.making)
         with closing(env):
             spaces = cast(Mapping[str, Any], env.observation_space)
-            self._extra = [*spaces["extra"]]
+            self._extra = sorted(spaces["extra"])  # as networks that were trained before know it
             cameras = by_place(cameras_of(env.layout, env.cameras))
         self.columns = [picture_column(ROBOMIMIC, camera, "rgb") for camera in cameras]
 

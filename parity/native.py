@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any
@@ -29,6 +29,7 @@ def make_native(
     picture_size: int | None = None,
     obs_mode: str = "state",
     robot_uid: str | None = None,
+    sensors: Mapping[str, Any] | None = None,
 ) -> Any:
     """Make the native environment of a task: one environment, CPU physics.
 
@@ -39,6 +40,7 @@ def make_native(
         picture_size: Width and height of its ``render_rgb_array`` (pixels); None takes native's.
         obs_mode: What it observes, in native's words.
         robot_uid: Native's name of its robot; None takes the task's own.
+        sensors: Native's ``sensor_configs``; None takes the cameras as they are.
 
     Raises:
         MissingPackageError: If mani_skill, or a package that it needs, is not installed.
@@ -51,6 +53,8 @@ def make_native(
         chosen: dict[str, Any] = {} if reward_mode is None else {"reward_mode": reward_mode}
         if robot_uid is not None:
             chosen["robot_uids"] = robot_uid
+        if sensors is not None:
+            chosen["sensor_configs"] = dict(sensors)
         if picture_size is not None:
             chosen["human_render_camera_configs"] = {"width": picture_size, "height": picture_size}
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,13 @@ def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
             yield from leaves(part, f"{name}/{key}" if name else f"{key}")
     else:
         yield name, tree
+
+
+def stacked(rows: Sequence[Any]) -> Any:
+    """Return nested mappings of arrays, all alike, or arrays, as one with a first axis more."""
+    if isinstance(rows[0], Mapping):
+        return {key: stacked([row[key] for row in rows]) for key in rows[0]}
+    return np.stack([np.asarray(row) for row in rows])
 
 
 def row_of(tree: Any, row: int) -> Any:

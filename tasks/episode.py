@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import fsum
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from robots import TaskError
 from tasks import TaskEnv
+from tasks.arrays import row_of, stacked
 
 States = dict[str, dict[str, NDArray[np.float32]]]
 
@@ -70,6 +71,8 @@ class PlayedEpisode(Episode):
             ``"actors"`` of ``source``; else None.
         corrections: What a corrector would have done at each step, (T, A), or None.
         reason: Why it failed; empty if it did not, or if that is unknown. Experts give a reason.
+        observations: What was observed after the reset and every step, (T + 1, …), or nested
+            mappings of that; None if it was not kept.
     """
 
     states: States
@@ -83,6 +86,7 @@ class PlayedEpisode(Episode):
     actor: NDArray[np.uint8] | None = None
     corrections: NDArray[np.float32] | None = None
     reason: str = ""
+    observations: Any = None
 
     @classmethod
     def of(
@@ -244,6 +248,7 @@ def play(
     watch: Callable[[], None] = lambda: None,
     *,
     start: Mapping[str, Mapping[str, Any]] | None = None,
+    observed: bool = False,
 ) -> PlayedEpisode:
     """Play actions in a freshly built world, and keep everything that happens.
 
@@ -253,6 +258,7 @@ def play(
         actions: Shape (T, A) with T of 1 or more.
         watch: Called after the reset and after every step.
         start: State to begin from instead of the one after the reset; see `moments`.
+        observed: Whether to keep what the task observes; not with a ``start``.
 
     Raises:
         TaskError: If the task has several environments, or there are no actions.
@@ -261,10 +267,14 @@ def play(
     if task.num_envs == 1 and not len(actions):
         raise TaskError("an episode needs at least one action")
     happening = moments(task, seed, open_loop(actions), len(actions), start=start)
-    next(happening)
+    seen = [next(happening).observation]
     tape = EpisodeTape(task, seed)
     watch()
     for action, moment in zip(actions, happening, strict=True):
         tape.add(action, moment)
+        if observed:
+            seen.append(moment.observation)
         watch()
-    return tape.read()
+    if not observed:
+        return tape.read()
+    return replace(tape.read(), observations=stacked([row_of(each, 0) for each in seen]))

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from layouts.commands import Page, Server
-from robot_layouts.core.cli import Folder, Seed
+from robot_layouts.core.cli import Folder, Seed, Word
 from robot_layouts.core.commands import printable
 from robot_layouts.core.pages import plural
 from robot_layouts.data.playing.command_options import (
     ControlMode,
+    PictureSize,
     Policy,
     RecordingOption,
     RecordingPath,
@@ -148,8 +149,14 @@ def replay(
     *,
     episodes: int | None = None,
     from_: Literal["seed", "state"] = "seed",
+    obs_mode: Annotated[str, Word("MODE")] | None = None,
+    camera_size: PictureSize | None = None,
+    out: Folder | None = None,
 ) -> int:
     """Play the actions of a recording again, and compare what happens.
+
+    With --obs-mode and --out, episodes that end as recorded are recorded again, with what is
+    observed in them; the same command goes on where it was stopped.
 
     Exit code: 0 if every episode ends as recorded, 1 if not, or if a file cannot be played.
     Episodes whose reset rebuilt the world must also have the recorded states to the last bit; those
@@ -159,9 +166,12 @@ def replay(
         recording: The recording.
         episodes: Play the first N episodes (all).
         from_: Begin by a reset with the recorded seed, or, not exactly, from the recorded state.
+        obs_mode: What to observe: state, state_dict, rgb and others.
+        camera_size: Width and height in pixels of the pictures observed (each camera's own).
+        out: Folder of the trajectory.h5 and .json that hold what was observed.
 
     Raises:
-        RobotLayoutsError: If the recording cannot be played.
+        RobotLayoutsError: If the recording cannot be played, or the other not be written.
     """
     import torch
     from rich.console import Console
@@ -169,15 +179,23 @@ def replay(
     from robot_layouts.core.progress import Progress
     from robot_layouts.data.playing.replay import replay
     from robot_layouts.data.reading.recorded_task import task_for
+    from robot_layouts.data.recording.recorder import again
 
+    if (obs_mode is None) != (out is None) or (out is not None and from_ == "state"):
+        raise TaskError("--obs-mode and --out go together, and not with --from state")
     torch.set_num_threads(1)
     with recording.open() as file:
-        task = task_for(file, **recording.cell.making())
+        cell = recording.cell.making()
+        task = task_for(file, **cell, obs_mode=obs_mode or "none", camera_size=camera_size)
         count = recording.count(file, episodes)
         found: list[Replayed] = []
-        with Progress(count, "episodes") as line:
+        with (
+            nullcontext() if out is None else again(file, task, out) as recorder,
+            Progress(count, "episodes") as line,
+        ):
             for number in range(count):
-                found.append(replay(task, file[number], from_))
+                keep = None if recorder is None else recorder.add_new
+                found.append(replay(task, file[number], from_, keep=keep))
                 line.advance(1, "replaying")
         console = Console(markup=False, highlight=False)
         console.print(

@@ -285,6 +285,10 @@ class Backend(Protocol):
         """
         ...
 
+    def segments(self) -> dict[int, Part]:
+        """Return what the numbers of a segmentation stand for, the same in every world."""
+        ...
+
     def inverse_kinematics(self, robot: str) -> PoseSolver:
         """Return a solver for poses of a robot's TCP, where it stands in the first environment."""
         ...

@@ -15,6 +15,7 @@ from torch import Tensor
 from robot_layouts.core.processes.start import preload
 from robot_layouts.simulation import Simulation, State, World
 from robot_layouts.simulation.maths import Floats, all_finite
+from robot_layouts.simulation.scene.parts import Part
 from robots import SimulationError, TaskError
 from tasks.engine.actions import ActionReader
 from tasks.engine.checks import (
@@ -38,9 +39,10 @@ from tasks.engine.divergence import (
     refuse_state,
 )
 from tasks.engine.observation import Observer, read_mode, space_of
+from tasks.engine.pictures import tiled
 from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
-from tasks.engine.scenario import Scenario
+from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario
 from tasks.engine.task import Info, Memory, Task
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
@@ -145,9 +147,12 @@ class TaskEnv(Remade):
         self.action_space = Box(np.tile(low, rows), np.tile(high, rows), dtype=np.float32)
         self._reader = ActionReader(self.layout, self.num_envs)
         observed = read_mode(scenario.obs_mode)
-        cameras = scenario.cameras or task.cameras if observed.textures else ()
+        cameras = scenario.cameras or task.cameras
         size = scenario.camera_size
-        self.observer = Observer(layout, observed, cameras, task.sensed, task.viewpoint, size)
+        shown = scenario.render_mode in SENSOR_RENDER_MODES
+        self.observer = Observer(
+            layout, observed, cameras, task.sensed, task.viewpoint, size, shown=shown
+        )
         first = task.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
         self._max_reward = np.array(task.max_reward, np.float32)
@@ -231,6 +236,14 @@ class TaskEnv(Remade):
             SimulationError: If the task was closed.
         """
         return self.simulation.read()
+
+    @property
+    def segmentation_id_map(self) -> dict[int, Part]:
+        """What the numbers of a segmentation stand for: ``part.name``, of ``part.robot`` or None.
+
+        The numbers are native's, and the names of links and bodies, too.
+        """
+        return self.simulation.backend.segments()
 
     def close(self) -> None:
         """Let the worlds go; closing twice is allowed."""
@@ -387,18 +400,26 @@ class TaskEnv(Remade):
         return observer.observe(self.simulation, state, parts)
 
     def render(self) -> np.ndarray:
-        """Return a picture of every environment, (N, 512, 512, 3) uint8.
+        """Return a picture of every environment, (N, H, W, 3) uint8.
+
+        With ``render_mode="rgb_array"`` it is one for people, 512 pixels wide and high; with
+        ``"sensors"`` what each camera sees, in colours, side by side; with ``"all"`` both.
 
         Raises:
-            TaskError: If the task was not made with ``render_mode="rgb_array"``.
+            TaskError: If the task was made without a ``render_mode``.
         """
-        if self.scenario.render_mode is None:
+        mode, pictures = self.scenario.render_mode, list[NDArray[np.uint8]]()
+        if mode is None:
             raise TaskError("this task draws no pictures; make it with render_mode='rgb_array'")
-        if self._camera is None:
-            from robot_layouts.simulation.rendering import Cameras
+        if mode != "sensors":
+            if self._camera is None:
+                from robot_layouts.simulation.rendering import Cameras
 
-            self._camera = Cameras(self.simulation, *self.task.viewpoint)
-        return self._camera.take()
+                self._camera = Cameras(self.simulation, *self.task.viewpoint)
+            pictures.append(self._camera.take())
+        if mode in SENSOR_RENDER_MODES:
+            pictures += self.observer.pictures(self.simulation)
+        return tiled(pictures)
 
     # -- inside ------------------------------------------------------------------------------
 
@@ -473,9 +494,8 @@ class TaskEnv(Remade):
         with unchanged(state, f"{name}.observe()"):
             parts = {} if mode.nothing else self._observed.checked(self.task.observe(state, info))
         self.observation_slices = self.observer.slices(self.simulation, state, parts)
-        if not mode.nothing:
-            self.single_observation_space = space_of(self.start[0], batched=True)
-            self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.single_observation_space = space_of(self.start[0], batched=True)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
 
     def _read(self) -> State:
         state = self.simulation.read()

@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Space
-from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.simulation import Camera, Simulation, State
 from robot_layouts.simulation.maths import Array, Floats, all_finite
-from robot_layouts.simulation.scene.cameras import TEXTURES, AnyCamera, RobotCamera, camera_name
+from robot_layouts.simulation.scene.cameras import (
+    RAW,
+    SHADERS,
+    TEXTURES,
+    RobotCamera,
+    camera_name,
+    shaders_for,
+)
 from robots import TaskError, unknown_name_message
 from tasks.engine.cameras import Size, cameras_of, expect_apart, resized
 from tasks.engine.columns import (
@@ -27,35 +33,14 @@ from tasks.engine.columns import (
     picture_column,
 )
 from tasks.engine.divergence import NotFinite
+from tasks.engine.pictures import POINTS, SHOWN, CameraRig, Pictures, as_picture, as_points
 from tasks.native import controllers
 from tasks.native.format import observation_keys
 from tasks.randomization.noise import Noisy
 
-if TYPE_CHECKING:
-    from robot_layouts.simulation.rendering import Observers, View
-
-PLAIN_MODES = ("state", "state_dict", "none", *COLUMN_MODES)
-SHORT_MODES = {"rgbd": "rgb+depth"}
-STATE_FORMS = ("state", "state_dict")  # what may be joined to images
-SEEN_COLUMNS = {  # what cameras add to the columns of exported datasets
-    f"{columns}+cameras{more}": (columns, textures)
-    for columns in (LEROBOT, ROBOMIMIC)
-    for more, textures in (("", ("rgb",)), ("+depth", ("rgb", "depth")))
-}
-OBS_MODES = (
-    *PLAIN_MODES,
-    *SEEN_COLUMNS,
-    "rgb",
-    "rgbd",
-    "rgb+depth+state",
-    "depth",
-    "rgb+segmentation",
-)
-"""Examples of observation modes; images and a form of state are joined in any order."""
-
 JOINTS = "qpos", "qvel"  # that every robot observes of itself
-
-_IMAGE_DTYPES = ("uint8", "int16")
+STATE_FORMS = ("state", "state_dict")  # what may be joined to images
+_JOINED = {"pointcloud": POINTS, "none": ()}  # what native takes in their company, too
 
 
 @dataclass(frozen=True)
@@ -63,24 +48,52 @@ class ObservationMode:
     """What an ``obs_mode`` asks for.
 
     Attributes:
-        textures: What cameras record of each pixel; none if there are no cameras.
+        textures: What cameras record of each pixel, in native's order; None if none observes.
         flat: Whether everything but images is one flat part.
         privileged: Whether it includes what only a simulation knows.
+        points: Whether images are observed as points of the world.
         nothing: Whether nothing is observed.
         columns: Which of `COLUMN_MODES`, if it is the columns of exported datasets that are
             observed.
     """
 
-    textures: tuple[str, ...] = ()
+    textures: tuple[str, ...] | None = None
     flat: bool = False
     privileged: bool = True
+    points: bool = False
     nothing: bool = False
     columns: str | None = None
 
     @property
     def draws(self) -> bool:
         """Whether pictures are observed."""
-        return bool(self.textures) or self.columns == FILMED
+        return self.textures is not None or self.columns == FILMED
+
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """What of it people are shown as colours; if that is nothing, colours and depth."""
+        textures = SHADERS["minimal"] if self.textures == RAW else self.textures or ()
+        return tuple(filter(SHOWN.__contains__, textures)) or ("rgb", "depth")
+
+
+MODES = {
+    "state": ObservationMode(flat=True),
+    "state_dict": ObservationMode(),
+    "none": ObservationMode(nothing=True),
+    **{name: ObservationMode(columns=name) for name in COLUMN_MODES},
+    **{
+        f"{columns}+cameras{more}": ObservationMode(textures, columns=columns)
+        for columns in (LEROBOT, ROBOMIMIC)
+        for more, textures in (("", ("rgb",)), ("+depth", ("rgb", "depth")))
+    },
+    "rgbd": ObservationMode(("rgb", "depth"), privileged=False),
+    "pointcloud": ObservationMode(POINTS, privileged=False, points=True),
+    "sensor_data": ObservationMode(RAW, privileged=False),
+}
+"""The modes that are no textures and forms of state joined by ``+``."""
+
+OBS_MODES = (*MODES, "rgb", "rgb+depth+state", "depth", "rgb+segmentation")
+"""Examples of observation modes; images and a form of state are joined in any order."""
 
 
 def read_mode(name: str) -> ObservationMode:
@@ -91,28 +104,19 @@ def read_mode(name: str) -> ObservationMode:
     """
     if not isinstance(name, str):
         raise TaskError(unknown_name_message("obs_mode", name, OBS_MODES))
-    if name in PLAIN_MODES:
-        columns = name if name in COLUMN_MODES else None
-        return ObservationMode(flat=name == "state", nothing=name == "none", columns=columns)
-    if name in SEEN_COLUMNS:
-        columns, textures = SEEN_COLUMNS[name]
-        return ObservationMode(textures, columns=columns)
-    parts = SHORT_MODES.get(name, name).split("+")
-    for part in parts:
-        if part not in (*TEXTURES, *STATE_FORMS):
-            wrong = unknown_name_message("obs_mode", name, OBS_MODES)
-            raise TaskError(
-                f"{wrong} Besides, any of {', '.join(TEXTURES)} are joined by '+', and one of"
-                f" {', '.join(STATE_FORMS)} to them"
-            )
-    textures = tuple(texture for texture in TEXTURES if texture in parts)
-    forms = [form for form in STATE_FORMS if form in parts]
-    if not textures or len(forms) > 1 or len(set(parts)) != len(parts):
+    if name in MODES:
+        return MODES[name]
+    parts = set(name.split("+"))
+    if not parts <= {*TEXTURES, *STATE_FORMS, *_JOINED}:
         raise TaskError(
-            f"obs_mode {name!r} is invalid; it needs at least one of {', '.join(TEXTURES)} and at"
-            f" most one of {', '.join(STATE_FORMS)}, each once"
+            f"{unknown_name_message('obs_mode', name, OBS_MODES)} Besides, any of"
+            f" {', '.join(TEXTURES)} are joined by '+', and {' or '.join(STATE_FORMS)} to them"
         )
-    return ObservationMode(textures, flat="state" in forms, privileged=bool(forms))
+    wanted = parts.intersection(TEXTURES).union(*(_JOINED[p] for p in parts & _JOINED.keys()))
+    textures = tuple(t for t in SHADERS[shaders_for(wanted)] if t in wanted)
+    return ObservationMode(
+        textures, flat="state" in parts, privileged=not parts.isdisjoint(STATE_FORMS)
+    )
 
 
 class Observer:
@@ -120,7 +124,7 @@ class Observer:
 
     Attributes:
         mode: What is asked for.
-        cameras: Camera by its name in observations; none if the mode has no images.
+        cameras: Camera by its name in observations; none if they are not used.
     """
 
     def __init__(
@@ -131,6 +135,8 @@ class Observer:
         sensed: Sequence[str],
         viewpoint: Viewpoint,
         size: Size | None = None,
+        *,
+        shown: bool = False,
     ) -> None:
         """Remember how to observe.
 
@@ -141,17 +147,20 @@ class Observer:
             sensed: See `tasks.MultiRobotTask`.
             viewpoint: From where people see the task.
             size: Width and height of all pictures (pixels); None: each camera's own.
+            shown: Whether people are shown what the cameras see.
 
         Raises:
-            TaskError: If images are asked for and there is no camera, or two have the same name.
+            TaskError: If images are asked for, to observe or to show, and there is no camera, or
+                two have the same name.
         """
         self.mode = mode
-        found = cameras_of(layout, cameras) if mode.textures else {}
+        looks = shown or mode.textures is not None
+        found = cameras_of(layout, cameras) if looks else {}
         self.cameras = {name: resized(camera, size) for name, camera in found.items()}
-        if mode.textures and not self.cameras:
+        if looks and not self.cameras:
             raise TaskError("there is no camera: the task declares none, nor do its robots")
         self._keys, self._robots, self._sensed = observation_keys(layout), tuple(layout), sensed
-        self._rig: _CameraRig | None = None
+        self._rigs: dict[tuple[str, ...], CameraRig] = {}  # by what they take
         self._columns = ColumnObserver(layout, mode.columns, viewpoint) if mode.columns else None
         if mode.columns:
             expect_apart(name for *_, name in self._picture_columns())
@@ -179,7 +188,8 @@ class Observer:
             return {}
         if self._columns:
             observed = self._columns.observe(simulation, state)
-            seen = self._look(simulation)["sensor_data"] if self.cameras else {}
+            textures = self.mode.textures
+            seen = self._look(simulation, textures)["sensor_data"] if textures else {}
             for camera, texture, name in self._picture_columns():
                 observed[name] = seen[camera][texture]
             return observed
@@ -187,11 +197,23 @@ class Observer:
             parts = self._sensible(parts)
         if noisy is not None:
             parts = {name: noisy(name, values) for name, values in parts.items()}
-        if not self.mode.textures:
+        if self.mode.textures is None:
             return self._state(simulation, state, parts, noisy)
-        images = self._look(simulation)
+        images = self._look(simulation, self.mode.textures)
+        if self.mode.points:
+            images = as_points(images)
         seen = self._state(simulation, state, parts, noisy)
         return {**images, "state": seen} if self.mode.flat else {**seen, **images}
+
+    def pictures(self, simulation: Simulation) -> list[Pictures]:
+        """Return what each camera sees in colours, for people, (N, H, W, 3) each."""
+        shown, observed = self.mode.shown, self.mode.textures or ()
+        look = self._look(simulation, observed if {*shown} <= {*observed} else shown)
+        return [
+            as_picture(texture, images[texture])
+            for images in look["sensor_data"].values()
+            for texture in shown
+        ]
 
     def senses(self, part: str) -> bool:
         """Return whether a part of `tasks.MultiRobotTask.observe` is observed beside images."""
@@ -207,12 +229,12 @@ class Observer:
 
     def changed(self, env_ids: Iterable[int]) -> None:
         """Note that these environments do not look any more as they did."""
-        if self._rig is not None:
-            self._rig.stale.update(env_ids)
+        for rig in self._rigs.values():
+            rig.stale.update(env_ids)
 
     def close(self) -> None:
         """Let the cameras go, and what else was made to observe."""
-        self._rig = None
+        self._rigs = {}
         if self._columns:
             self._columns.close()
 
@@ -252,10 +274,10 @@ class Observer:
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _look(self, simulation: Simulation) -> dict[str, Any]:
-        if self._rig is None:
-            self._rig = _CameraRig(simulation, self.cameras, self.mode.textures)
-        return self._rig.look()
+    def _look(self, simulation: Simulation, textures: tuple[str, ...]) -> dict[str, Any]:
+        if textures not in self._rigs:
+            self._rigs[textures] = CameraRig(simulation, self.cameras, textures)
+        return self._rigs[textures].look()
 
     def _picture_columns(self) -> list[tuple[str, str, str]]:
         """Return camera, texture and the name of its column, of each picture of an export."""
@@ -266,7 +288,7 @@ class Observer:
                 picture_column(str(self.mode.columns), camera_name(camera), texture),
             )
             for name, camera in self.cameras.items()
-            for texture in self.mode.textures
+            for texture in self.mode.textures or ()
         ]
 
     def _state(
@@ -323,67 +345,30 @@ class Observer:
         return {key: x for key, x in parts.items() if self.senses(key)}
 
 
-class _CameraRig:
-    """The latest images of every environment; only those that changed are drawn again."""
-
-    def __init__(
-        self,
-        simulation: Simulation,
-        cameras: Mapping[str, AnyCamera],
-        textures: Sequence[str],
-    ) -> None:
-        from robot_layouts.simulation.rendering import (
-            Observers,  # loaded with the first picture
-        )
-
-        self._observers: Observers = Observers(simulation, cameras, textures)
-        self._rows: list[dict[str, View]] = [{}] * simulation.num_envs
-        self.stale = set(range(simulation.num_envs))
-
-    def look(self) -> dict[str, Any]:
-        begun = {env: self._observers.begin(env) for env in sorted(self.stale)}
-        for env, finish in begun.items():
-            self._rows[env] = finish()
-        self.stale.clear()
-        names = list(self._rows[0])
-        matrices = ("extrinsic_cv", "cam2world_gl", "intrinsic_cv")
-        return {
-            "sensor_param": {
-                name: {m: _stacked(getattr(row[name], m) for row in self._rows) for m in matrices}
-                for name in names
-            },
-            "sensor_data": {
-                name: {
-                    texture: _stacked(row[name].images[texture] for row in self._rows)
-                    for texture in self._rows[0][name].images
-                }
-                for name in names
-            },
-        }
-
-
-def _stacked(rows: Iterable[NDArray[Any]]) -> NDArray[Any]:
-    return np.stack(list(rows))
-
-
 def space_of(values: Any, *, batched: bool = False) -> Space[Any]:
-    """Return the space of an observation: of numbers any, of images what their type can hold.
+    """Return the space of an observation, with its keys in the same order, as native has it.
+
+    Numbers with a point may be any, integers what their type can hold, and flags 0 or 1.
 
     Args:
         values: Arrays or tensors, or mappings of them.
         batched: Whether the first axis of each counts environments, and is left out.
     """
-    if isinstance(values, Mapping):
-        return Dict({key: space_of(part, batched=batched) for key, part in values.items()})
+    if isinstance(values, Mapping):  # Gymnasium sorts a mapping, but not a list
+        return Dict([(key, space_of(part, batched=batched)) for key, part in values.items()])
     shape = tuple(values.shape[1:] if batched else values.shape)
-    dtype = observed_dtype(values)
-    if np.issubdtype(dtype, np.integer):
-        bounds = np.iinfo(dtype)
-        return Box(int(bounds.min), int(bounds.max), shape, dtype)
-    return Box(-np.inf, np.inf, shape, np.float32)
+    dtype = _dtype(values)
+    if dtype.kind == "f":
+        return Box(-np.inf, np.inf, shape, dtype.type)
+    low, high = (0, 1) if dtype.kind == "b" else (np.iinfo(dtype).min, np.iinfo(dtype).max)
+    return Box(int(low), int(high), shape, dtype.type)
 
 
 def observed_dtype(values: Any) -> Any:
-    """Return an observation's dtype: that of images their own, else float32."""
-    dtype = np.dtype(str(values.dtype).removeprefix("torch."))
-    return dtype.type if dtype.name in _IMAGE_DTYPES else np.float32
+    """Return the dtype in which interfaces give an observation: its own, but of float64 float32."""
+    dtype = _dtype(values)
+    return np.float32 if dtype.kind == "f" else dtype.type
+
+
+def _dtype(values: Any) -> np.dtype[Any]:
+    return np.dtype(str(values.dtype).removeprefix("torch."))

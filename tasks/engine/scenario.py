@@ -22,7 +22,8 @@ from tasks.engine.observation import read_mode
 from tasks.language.needs import ACT, HOLD
 from tasks.randomization.declaration import Randomization
 
-RENDER_MODES = (None, "rgb_array")
+SENSOR_RENDER_MODES = ("sensors", "all")  # that show what cameras see
+RENDER_MODES = ("rgb_array", *SENSOR_RENDER_MODES)
 LEAST_BYTES = 400_000  # of an environment: that of PickCube-v1, one of the smallest, takes 435 kB
 
 
@@ -35,9 +36,10 @@ class Scenario:
         num_envs: Number of environments in this process; each takes about 0.5 MB and more.
         physics: Solver settings; None keeps SAPIEN's own defaults.
         obs_mode: ``"state"`` (flat), ``"state_dict"`` (named parts), ``"none"``, or what cameras
-            see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, or any of ``rgb``, ``depth``,
-            ``segmentation`` and ``position`` joined by ``+``, and to them ``state`` or
-            ``state_dict``, without which images come only with what a real robot senses.
+            see (needs a Vulkan driver): ``"rgb"``, ``"rgbd"``, ``"pointcloud"``,
+            ``"sensor_data"`` (raw), or any of ``rgb``, ``depth``, ``segmentation``, ``position``,
+            ``normal`` and ``albedo`` joined by ``+``, and to them ``state`` or ``state_dict``,
+            without which images come only with what a real robot senses.
             ``"lerobot"`` and ``"robomimic"`` give the columns that exports in these formats hold,
             under their names, so that a policy trained on one plays here as it is;
             ``"lerobot+video"`` gives the pictures of exports with video, too; ``"lerobot+cameras"``
@@ -50,7 +52,8 @@ class Scenario:
             in ``"pd_joint_delta_pos"``.
         control_frequency: Control steps per second (Hz); a whole number of physics steps each.
         max_episode_steps: Control steps until an episode is truncated; None takes the task's.
-        render_mode: ``"rgb_array"`` to draw pictures (needs a Vulkan driver), or None.
+        render_mode: ``"rgb_array"`` to draw pictures for people (needs a Vulkan driver),
+            ``"sensors"`` to show them what the cameras see, ``"all"`` for both, or None.
         headless: No window is opened; the only choice.
         cameras: Cameras to observe with, in the place of the task's own; empty takes those. Those
             of the robots come after.
@@ -127,7 +130,7 @@ class Scenario:
             )
         for name, choices in (
             ("simulator", tuple(SIMULATORS)),
-            ("render_mode", RENDER_MODES),
+            ("render_mode", (None, *RENDER_MODES)),
             ("bystanders", (None, HOLD, ACT)),
             ("reward_mode", (None, *reward_modes)),
         ):

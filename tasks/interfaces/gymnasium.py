@@ -14,10 +14,9 @@ from robots import TaskError
 from tasks.engine.checks import RECONFIGURE, SEED, SUCCESS, checked_seeds, own_options
 from tasks.engine.observation import observed_dtype, space_of
 from tasks.engine.remade import Remade
+from tasks.engine.scenario import RENDER_MODES
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import make
-
-RENDER_MODES = ["rgb_array"]
 
 
 class OneEnvironment(Remade):
@@ -25,7 +24,7 @@ class OneEnvironment(Remade):
 
     Attributes:
         task: The task.
-        render_mode: ``"rgb_array"`` if it draws pictures.
+        render_mode: What it draws for people; see `tasks.Scenario`.
     """
 
     def _make(self, task_id: str, render_mode: str | None, fields: Mapping[str, Any]) -> int:
@@ -49,9 +48,9 @@ class OneEnvironment(Remade):
         return obs, info_row(info, self._seed), own[0]
 
     def render(self) -> NDArray[np.uint8] | None:
-        """Return a picture, (512, 512, 3) uint8.
+        """Return a picture, (H, W, 3) uint8; see `tasks.TaskEnv.render`.
 
-        Without ``render_mode="rgb_array"``, this warns and returns None, as Gymnasium's interface
+        Without a ``render_mode``, this warns and returns None, as Gymnasium's interface
         asks: trainers call it whether pictures are wanted or not.
         """
         if self.render_mode is None:
@@ -78,14 +77,14 @@ class GymnasiumTask(OneEnvironment, gymnasium.Env[Any, NDArray[np.float32]]):
         task: The task, with one environment.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 20}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [*RENDER_MODES], "render_fps": 20}
 
     def __init__(self, task_id: str, render_mode: str | None = None, **fields: Any) -> None:
         """Make the task.
 
         Args:
             task_id: The task's id or another of its names.
-            render_mode: ``"rgb_array"`` to draw pictures, which needs a Vulkan driver.
+            render_mode: What to draw for people, which needs a Vulkan driver; see `tasks.Scenario`.
             fields: Other arguments of `tasks.make`, without ``num_envs``.
 
         Raises:

@@ -129,7 +129,7 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
         """Return a picture of every environment, (512, 512, 3) uint8 each.
 
         Raises:
-            TaskError: If it was not made with ``render_mode="rgb_array"``.
+            TaskError: If it was made without a ``render_mode``.
             VectorWorkerError: If workers die, hang or fail.
         """
         return self.vector.render()

@@ -13,8 +13,8 @@ from pettingzoo import ParallelEnv
 
 from robot_layouts.core.bounds import shown
 from robots import TaskError, UnknownNameError
-from tasks.engine.columns import COLUMN_MODES
-from tasks.engine.observation import SEEN_COLUMNS, space_of
+from tasks.engine.observation import read_mode, space_of
+from tasks.engine.scenario import RENDER_MODES
 from tasks.interfaces.gymnasium import OneEnvironment, info_row, row
 from tasks.native.controllers import CONTROLLER
 from tasks.native.format import native_places, observation_keys
@@ -51,7 +51,7 @@ class ParallelTask(OneEnvironment, ParallelEnv[str, Observation, NDArray[np.floa
 
     metadata: ClassVar[dict[str, Any]] = {
         "name": "robot_layouts",
-        "render_modes": ["rgb_array"],
+        "render_modes": [*RENDER_MODES],
         "render_fps": 20,
         "is_parallelizable": True,
     }
@@ -66,9 +66,9 @@ class ParallelTask(OneEnvironment, ParallelEnv[str, Observation, NDArray[np.floa
         """Make the task; see `tasks.parallel_env`."""
         if "num_envs" in fields:
             raise TaskError("parallel_env takes no num_envs: it is one environment")
-        mode = fields.get("obs_mode")
-        if mode in ("none", *COLUMN_MODES, *SEEN_COLUMNS):
-            raise TaskError(f"parallel_env takes no obs_mode={mode!r}; choices: 'state', 'rgb', …")
+        mode = read_mode(name := fields.get("obs_mode", "state"))
+        if mode.nothing or mode.columns or mode.points:
+            raise TaskError(f"parallel_env takes no obs_mode={name!r}; choices: 'state', 'rgb', …")
         frames = self._make(task_id, render_mode, fields)
         self.metadata = {**self.metadata, "name": self.task.task_id, "render_fps": frames}  # type: ignore[misc]
         if not (robot_reward is None or callable(robot_reward)):

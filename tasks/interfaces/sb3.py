@@ -142,10 +142,10 @@ class SB3Task(Remade, VecEnv):
         self.vector.close()
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
-        """Return a picture of every environment, (512, 512, 3) uint8 each.
+        """Return a picture of every environment, (H, W, 3) uint8 each; see `tasks.TaskEnv.render`.
 
         Raises:
-            TaskError: If it was not made with ``render_mode="rgb_array"``.
+            TaskError: If it was made without a ``render_mode``.
         """
         return list(self.vector.render())
 
@@ -206,7 +206,7 @@ def _rows(info: Mapping[str, Any], num_envs: int) -> list[dict[str, Any]]:
 
 
 def _flat_space(space: Space[Any]) -> Space[Any]:
-    return Dict(dict(leaves(space))) if isinstance(space, Dict) else space
+    return Dict(list(leaves(space))) if isinstance(space, Dict) else space
 
 
 def _flat(observation: Any) -> Any:

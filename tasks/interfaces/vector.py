@@ -23,8 +23,8 @@ from tasks.engine.checks import RECONFIGURE, SUCCESS, checked_options, checked_s
 from tasks.engine.observation import space_of
 from tasks.engine.places import built_layout
 from tasks.engine.remade import Remade
+from tasks.engine.scenario import RENDER_MODES
 from tasks.interfaces.batch import FINAL, INFO, OBSERVATION, BatchPart
-from tasks.interfaces.gymnasium import RENDER_MODES
 from tasks.interfaces.workers import InProcess, VectorWorkerError, Workers, partition
 from tasks.language.randomness import FirstSeeds
 from tasks.registry import get_task_class, make_scenario
@@ -84,7 +84,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         busy: Locked while a thread calls it.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": RENDER_MODES, "render_fps": 20}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [*RENDER_MODES], "render_fps": 20}
 
     def __init__(
         self,
@@ -114,7 +114,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
                 ``terminated`` is always false; ``info`` still has ``success``. A policy that
                 learns from dense rewards, which success would cut short, else learns to avoid it.
             timeout: Seconds that workers may take for a step or a reset; None waits for ever.
-            render_mode: ``"rgb_array"`` to draw pictures, which needs a Vulkan driver.
+            render_mode: What to draw for people, which needs a Vulkan driver; see `tasks.Scenario`.
             fields: Other arguments of `tasks.make`.
 
         Raises:
@@ -294,10 +294,10 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
     @_one_thread
     def render(self) -> tuple[NDArray[np.uint8], ...]:  # type: ignore[override]
-        """Return a picture of every environment, (512, 512, 3) uint8 each.
+        """Return a picture of every environment, (H, W, 3) uint8 each; see `tasks.TaskEnv.render`.
 
         Raises:
-            TaskError: If it was not made with ``render_mode="rgb_array"``.
+            TaskError: If it was made without a ``render_mode``.
             VectorWorkerError: If workers die, hang or fail.
         """
         if self.render_mode is None:

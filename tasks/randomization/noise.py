@@ -14,7 +14,7 @@ import numpy as np
 
 from robot_layouts.simulation.maths import Array, Floats
 from robots import UnknownNameError
-from tasks.arrays import row_of
+from tasks.arrays import row_of, stacked
 from tasks.randomization.distributions import Distribution, Stream
 from tasks.randomization.targets import RandomizedThings, matching
 
@@ -148,10 +148,4 @@ class ObservationDelay:
         """
         for env in env_ids:
             self._kept[env].append(copy.deepcopy(row_of(observation, env)))
-        return _stacked([kept[0] for kept in self._kept])
-
-
-def _stacked(rows: Sequence[Any]) -> Any:
-    if isinstance(rows[0], Mapping):
-        return {key: _stacked([row[key] for row in rows]) for key in rows[0]}
-    return np.stack(rows)
+        return stacked([kept[0] for kept in self._kept])

@@ -20,7 +20,7 @@ HUGE, INF = 1e300, math.inf
 # Of each argument: a wrong value for its checker, and what its own bounds leave out.
 WRONG_FIELDS: dict[str, tuple[Any, ...]] = {
     "num_envs": (0, "4", 10**30),
-    "obs_mode": ("stat", 5, "rgb+", "state+rgb+rgb", None, "rgb\0"),
+    "obs_mode": ("stat", 5, "rgb+", "rgbd+state", None, "rgb\0"),
     "reward_mode": ("stat", "DENSE"),
     "control_mode": ("stat", "pd_joint_delta"),
     "simulator": ("stat", None, "mujoco"),

@@ -9,9 +9,10 @@ import tasks
 from layouts import single
 from robot_layouts.simulation import Box, Camera, Simulation, World
 from robot_layouts.simulation.rendering import vulkan_problem
+from robot_layouts.simulation.sapien3.backdrop import LAYERED
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.studio import Studio
-from robot_layouts.simulation.scene.cameras import TEXTURES
+from robot_layouts.simulation.scene.cameras import SHADERS
 from tests.quick import quick_cases
 
 CAMERAS = {
@@ -55,9 +56,9 @@ def pictures(simulation: Simulation, *, layered: bool, cameras=CAMERAS) -> list[
     simulation.look(0, cameras, ("rgb",), markers=False)  # which sets the studio up
     bodies = studio_of(simulation)._bodies
     solid, bodies.solid = bodies.solid, bodies.solid and layered
-    views = simulation.look(0, cameras, TEXTURES, markers=False)
+    views = simulation.look(0, cameras, SHADERS[LAYERED], markers=False)
     bodies.solid = solid
-    return [view.images[texture] for view in views for texture in TEXTURES]
+    return [view.images[texture] for view in views for texture in SHADERS[LAYERED]]
 
 
 def expect_same(simulation: Simulation) -> None:

@@ -196,9 +196,9 @@ MISTAKES = (
         (
             "unknown obs_mode 'states'. Did you mean 'state'? Choices: state, state_dict, none,"
             " lerobot, lerobot+video, robomimic, lerobot+cameras, lerobot+cameras+depth,"
-            " robomimic+cameras, robomimic+cameras+depth, rgb, rgbd, rgb+depth+state, depth,"
-            " rgb+segmentation. Besides, any of rgb, depth, segmentation, position are joined by"
-            " '+', and one of state, state_dict to them"
+            " robomimic+cameras, robomimic+cameras+depth, rgbd, pointcloud, sensor_data, rgb,"
+            " rgb+depth+state, depth, rgb+segmentation. Besides, any of rgb, depth, segmentation,"
+            " position, normal, albedo are joined by '+', and state or state_dict to them"
         ),
         fields={"obs_mode": "states"},
     ),

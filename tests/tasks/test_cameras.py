@@ -240,6 +240,44 @@ def test_gymnasium_takes_images():
     env.close()
 
 
+@drawing
+def test_interfaces_show_what_cameras_see():
+    fields = {"cameras": SMALL}
+    env = gymnasium.make(f"RobotLayouts/{TASK}", render_mode="sensors", **fields)
+    env.reset(seed=3)
+    assert env.render().shape == (32, 2 * 48, 3)  # colours and depth
+    env.close()
+    vec = gymnasium.make_vec(
+        f"RobotLayouts/{TASK}", num_envs=2, num_workers=0, render_mode="all", **fields
+    )
+    vec.reset(seed=3)
+    assert [picture.shape for picture in vec.render()] == [(512, 512 + 48, 3)] * 2
+    vec.close()
+
+
+@drawing
+def test_interfaces_give_points_and_flags():
+    fields = {"obs_mode": "pointcloud", "cameras": SMALL}
+    env = gymnasium.make(f"RobotLayouts/{TASK}", **fields)
+    vec = gymnasium.make_vec(f"RobotLayouts/{TASK}", num_envs=2, num_workers=0, **fields)
+    alone, _ = env.reset(seed=4)
+    both, _ = vec.reset(seed=4)
+    assert env.observation_space.contains(alone)
+    assert vec.observation_space.contains(both)
+    for points in (alone["pointcloud"], {k: x[0] for k, x in both["pointcloud"].items()}):
+        assert {k: (x.shape, x.dtype) for k, x in points.items()} == {
+            "xyzw": ((32 * 48, 4), np.float32),
+            "rgb": ((32 * 48, 3), np.uint8),
+            "segmentation": ((32 * 48, 1), np.int16),
+        }
+        np.testing.assert_array_equal(points["xyzw"], alone["pointcloud"]["xyzw"])
+    assert alone["extra"]["is_grasped"].dtype == both["extra"]["is_grasped"].dtype == bool
+    for interface in (env, vec):
+        interface.close()
+    with pytest.raises(TaskError, match="parallel_env takes no obs_mode='pointcloud'"):
+        tasks.parallel_env(TASK, **fields)
+
+
 @pytest.mark.long
 @drawing
 @pytest.mark.parametrize("num_workers", [0, 1])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -208,6 +208,7 @@ def replay(
     *,
     everything: bool = False,
     watch: Callable[[], None] = lambda: None,
+    keep: Callable[[PlayedEpisode], None] | None = None,
 ) -> Replayed:
     """Play the actions of a recorded episode again, and compare.
 
@@ -218,6 +219,8 @@ def replay(
             recorded state. The latter is not exact, as PhysX's memory is not part of a state.
         everything: Whether to compare rewards, flags and what was varied, too, not states alone.
         watch: Called after the reset and after every step.
+        keep: Given the episode with what the task observed in it, if it agrees with the recording;
+            from its seed alone.
 
     Raises:
         TrajectoryError: If the file does not say the seed, or has no states to start from.
@@ -232,9 +235,12 @@ def replay(
         for kind, entries in (states or {}).items()
     }
     begin = first if start == "state" else None
-    episode = play(task, trajectory.seed or 0, trajectory.actions, watch, start=begin)
+    observed = keep is not None
+    episode = play(
+        task, trajectory.seed or 0, trajectory.actions, watch, start=begin, observed=observed
+    )
     compared = states is not None
-    return Replayed(
+    found = Replayed(
         episode_id=trajectory.episode_id,
         seed=trajectory.seed,
         steps=len(trajectory.actions),
@@ -246,6 +252,20 @@ def replay(
         ),
         exact=start == "seed" and trajectory.rebuilt,
         varied_alike=trajectory.drawn in (None, episode.drawn),
+    )
+    if keep is not None and found.agrees:
+        keep(_signed(episode, trajectory))
+    return found
+
+
+def _signed(episode: PlayedEpisode, recorded: Trajectory) -> PlayedEpisode:
+    """Return an episode that was played again with what the recording says of who acted."""
+    return replace(
+        episode,
+        source=recorded.source,
+        actor=recorded.actor,
+        corrections=recorded.corrections,
+        reason=recorded.reason,
     )
 
 

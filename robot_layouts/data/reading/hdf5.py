@@ -31,7 +31,7 @@ from robots import RobotLayoutsError
 
 MAX_BYTES = 2**30  # of one episode's arrays
 MAX_ARRAYS = 10_000  # of one episode
-MAX_DEPTH = 4  # groups of an episode inside one another: env_states/actors/cube is 2 deep
+MAX_DEPTH = 5  # groups of an episode inside one another: env_states/actors/cube is 2 deep
 MAX_CHUNK = 2**26  # bytes of a chunk, unpacked; h5py itself makes chunks of at most 1 MiB
 MAX_ATTRIBUTES = 100  # of one group
 

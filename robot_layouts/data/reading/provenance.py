@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Annotated, Any
@@ -66,6 +66,8 @@ ARRAYS = (
     "corrections",
 )
 TEXTS = ("action_split", "episode")
+OBSERVATIONS = "obs"  # an array, or a group of some
+OBSERVED = "obs_checksum"  # the same of these, which are not read with an episode
 
 # What may change from one resumption to the next, and what earlier versions did not write.
 NOT_COMPARED = ("source_type", "source_desc", "guessed", FILE_NUMBER)
@@ -225,7 +227,26 @@ def checksum(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) 
 
     It covers `TEXTS` and `ARRAYS`; what others may have added is left out.
     """
-    names = sorted(name for name in arrays if name.partition("/")[0] in ARRAYS)
+    return _crc(attributes, arrays, ARRAYS)
+
+
+def checksums(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) -> dict[str, str]:
+    """Return the checksums of an episode by the attributes that hold them."""
+    found = {CHECKSUM: checksum(attributes, arrays)}
+    if any(name.partition("/")[0] == OBSERVATIONS for name in arrays):
+        found[OBSERVED] = observed_checksum(arrays)
+    return found
+
+
+def observed_checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the checksum of what was observed in an episode."""
+    return _crc({}, arrays, (OBSERVATIONS,))
+
+
+def _crc(
+    attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]], kinds: Sequence[str]
+) -> str:
+    names = sorted(name for name in arrays if name.partition("/")[0] in kinds)
     about = [
         [(name, attributes.get(name)) for name in TEXTS],
         [(name, arrays[name].dtype.str, arrays[name].shape) for name in names],
@@ -236,27 +257,32 @@ def checksum(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]]) 
     return f"crc32 {found:08x}"
 
 
-def describe_task(task: TaskEnv, source: str, source_desc: str | None) -> dict[str, Any]:
+def describe_task(
+    task: TaskEnv, source: str, source_desc: str | None, *, observed: bool = False
+) -> dict[str, Any]:
     """Return what every file of a recording says about all its episodes.
 
     Args:
         task: The task.
         source: Where the actions come from, in ManiSkill's words.
         source_desc: The same in one's own words.
+        observed: Whether observations are in the file.
 
     Raises:
         AssetError: If robot files cannot be found.
     """
     name, guessed = full_name(task.task_class), describe_guessed(task.scenario.layout)
+    size = task.scenario.camera_size if observed else None
     return {
         "env_info": {
             "env_id": task.task_id,
             **({"module": name.rpartition(":")[0]} if ":" in name else {}),
             "env_kwargs": {
-                "obs_mode": "none",
+                "obs_mode": task.obs_mode if observed else "none",
                 "reward_mode": task.reward_mode,
                 "control_mode": plain_mode(task.control_mode),
                 "sim_backend": "physx_cpu",
+                **({"sensor_configs": {"width": size[0], "height": size[1]}} if size else {}),
             },
             "max_episode_steps": task.max_episode_steps,
         },

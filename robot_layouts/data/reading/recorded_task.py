@@ -12,6 +12,7 @@ from robot_layouts.data.reading.provenance import guess_again
 from robot_layouts.data.reading.recording import Recording
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 from tasks import MultiRobotTask, TaskEnv, get_task_class, make
+from tasks.engine.cameras import Size
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
 from tasks.randomization.declaration import Randomization
@@ -56,6 +57,8 @@ def task_for(
     robots: RobotLike | Mapping[str, RobotLike] | None = None,
     bystanders: str | None = None,
     pictures: bool = False,
+    obs_mode: str = "none",
+    camera_size: Size | None = None,
 ) -> TaskEnv:
     """Make the task that a file was recorded in, with its robots where they stood.
 
@@ -65,6 +68,8 @@ def task_for(
         robots: Which robots these were, where the file cannot say it; the same are needed.
         bystanders: What those without a place did, where the file cannot say it.
         pictures: Whether to draw its worlds.
+        obs_mode: What it observes.
+        camera_size: Width and height of what cameras observe (pixels); None: each camera's own.
 
     Raises:
         UnknownNameError: If there is no such task.
@@ -83,7 +88,8 @@ def task_for(
     making["randomization"] = _varied(file)
     task = make(
         file.task_id,
-        obs_mode="none",
+        obs_mode=obs_mode,
+        camera_size=camera_size,
         control_mode=mode_by_arm(file.control_mode, making["layout"] or cls.layout),
         render_mode="rgb_array" if pictures else None,
         **making,

@@ -34,6 +34,8 @@ from robot_layouts.data.reading.provenance import (
     CHECKSUM,
     GUESSED,
     LAYOUT,
+    OBSERVATIONS,
+    OBSERVED,
     SIMULATION,
     STATES,
     TEXTS,
@@ -43,6 +45,7 @@ from robot_layouts.data.reading.provenance import (
     describe_simulation,
     differences,
     listing,
+    observed_checksum,
     read_described,
 )
 from robots import UnreadableFileError, closest_match
@@ -196,16 +199,29 @@ class Recording(Sequence[Trajectory]):
         """
         if isinstance(index, slice):
             return [self[place] for place in range(*index.indices(len(self)))]
-        place = range(len(self))[index]
-        number = bisect_right(self._starts, place) - 1
-        file = self._file(number)
-        entry = file.entries[place - self._starts[number]]
+        file, entry = self._place(index)
         found = file.read(entry)
-        if number and found.actions.shape[1] != (self._action_dim or found.actions.shape[1]):
+        numbers = found.actions.shape[1]
+        if file is not self._first and numbers != (self._action_dim or numbers):
             file.refuse(
                 entry, f"its actions have shape {found.actions.shape}, not (T, {self._action_dim})"
             )
-        return found if self.manifest is None else replace(found, episode_id=place)
+        if self.manifest is None:
+            return found
+        return replace(found, episode_id=range(len(self))[index])
+
+    def observations(self, index: int) -> Any:
+        """Return what was observed in an episode, as the file holds it; None if it holds nothing.
+
+        Returns:
+            (T + 1, …), the first row being of the reset, or nested dicts of such arrays.
+
+        Raises:
+            IndexError: If there is no such episode.
+            TrajectoryError: If it is damaged.
+        """
+        file, entry = self._place(index)
+        return file.observations(entry)
 
     @property
     def corrected(self) -> bool:
@@ -266,6 +282,13 @@ class Recording(Sequence[Trajectory]):
                 f"{self.path} was recorded in another world than this {task.task_id}:"
                 f" {listing(found)}"
             )
+
+    def _place(self, index: int) -> tuple[_File, EpisodeEntry]:
+        """Return the file that an episode is in, and its entry there."""
+        place = range(len(self))[index]
+        number = bisect_right(self._starts, place) - 1
+        file = self._file(number)
+        return file, file.entries[place - self._starts[number]]
 
     def _file(self, number: int) -> _File:
         """Return one of the files, opened.
@@ -351,6 +374,25 @@ class _File:
             corrections=_column(arrays, "corrections", np.float32),
             reason=entry.reason,
         )
+
+    def observations(self, entry: EpisodeEntry) -> Any:
+        """Return what was observed in an episode; see `Recording.observations`."""
+        steps, _ = self.action_shape(entry, self.shapes(entry, ("actions",)))
+        with self._damage(entry.group):
+            own = (self.hdf5.texts(entry.group, (OBSERVED,)) or {}).get(OBSERVED)
+            arrays = self.hdf5.numbers(entry.group, (OBSERVATIONS,))
+        if own not in (None, observed_checksum(arrays)):
+            self.refuse(entry, "its observations are damaged: their checksum is another")
+        found: dict[str, Any] = {}
+        for name, rows in arrays.items():
+            if len(rows) != steps + 1:
+                self.refuse(entry, f"its {name} has shape {rows.shape}, not ({steps + 1}, …)")
+            *path, last = name.split("/")
+            branch = found
+            for key in path:
+                branch = branch.setdefault(key, {})
+            branch[last] = rows
+        return found.get(OBSERVATIONS)
 
     def texts(self, entry: EpisodeEntry) -> dict[str, str]:
         """Return the attributes of an episode that say what it is, if it has any."""

@@ -30,13 +30,14 @@ from robot_layouts.core.writing import PARTIAL, written_whole
 from robot_layouts.data.reading.hdf5 import MAX_BYTES, Hdf5File, damage_errors
 from robot_layouts.data.reading.json_files import MAX_SEED, OwnEpisode
 from robot_layouts.data.reading.provenance import (
-    CHECKSUM,
+    OBSERVATIONS,
     STATES,
-    checksum,
+    checksums,
     read_described,
 )
 from robot_layouts.data.recording.disk import DiskFile, disk_errors
 from robots import RecordingError
+from tasks.arrays import leaves
 from tasks.episode import REBUILT, PlayedEpisode
 
 _SUFFIX = ".part"
@@ -48,7 +49,7 @@ _MAX_PART = MAX_BYTES + 2**24  # bytes
 
 _ARRAY_NAME = (
     r"^(actions|rewards|success|terminated|truncated|actor|corrections"
-    r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3})\Z"
+    r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3}|obs(/[^/\0]+){0,5})\Z"
 )
 # From HDF5 1.8, the first in which attributes may be larger than 64 kB.
 _VERSIONS = "v108", "latest"
@@ -67,7 +68,7 @@ class _Content(TypedDict):
     arrays: list[
         tuple[
             Annotated[str, Meta(pattern=_ARRAY_NAME, description="the name of an array")],
-            Literal["<f4", "<f8", "|b1", "|u1"],
+            Literal["<f4", "<f8", "|b1", "|u1", "<i2", "<i4", "<i8"],
             list[Annotated[int, whole(0, MAX_BYTES)]],
         ]
     ]
@@ -281,6 +282,8 @@ def _arrays(episode: PlayedEpisode) -> dict[str, NDArray[Any]]:
     for name in ("actor", "corrections"):
         if (rows := getattr(episode, name)) is not None:
             arrays[name] = rows
+    if episode.observations is not None:
+        arrays.update(leaves(episode.observations, OBSERVATIONS))
     return arrays
 
 
@@ -384,7 +387,7 @@ def join(
 
 def _write_episode(file: h5py.File, name: str, stored: Stored) -> None:
     groups = {"": _new_group(file, name)}
-    own = {CHECKSUM: checksum(stored.attributes, stored.arrays)}
+    own = checksums(stored.attributes, stored.arrays)
     for key, text in sorted({**stored.attributes, **own}.items()):
         groups[""].attrs.create(key, text, dtype=_TEXT)
     for key, rows in sorted(stored.arrays.items()):
@@ -429,9 +432,9 @@ def read_joined_episode(file: Hdf5File, name: str) -> Stored:
         ValueError: If its checksum is another, or it is no episode.
     """
     attributes, arrays = file.texts(name) or {}, file.numbers(name)
-    own = attributes.pop(CHECKSUM, None)  # an earlier version wrote none
-    if own not in (None, checksum(attributes, arrays)):
-        raise FieldError(f"the checksum of {name} is another")
+    for kind, own in checksums(attributes, arrays).items():
+        if attributes.pop(kind, own) != own:  # an earlier version wrote none
+            raise FieldError(f"the checksum of {name} is another")
     if read_described(attributes, "episode", OwnEpisode) is None:
         raise FieldError(f"{name} has no attribute 'episode'")
     return Stored(attributes, arrays)

@@ -45,6 +45,7 @@ from robot_layouts.data.reading.provenance import (
     numbered,
     recorded_control_mode,
 )
+from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.disk import claim, disk_errors
 from robot_layouts.data.recording.episode_files import (
     JoinedEpisode,
@@ -350,6 +351,7 @@ class Recorder:
         source: str = "scripted",
         source_desc: str | None = None,
         file_size: float = FILE_SIZE,
+        observed: bool = False,
     ) -> None:
         """Begin a recording, or go on with one.
 
@@ -361,6 +363,7 @@ class Recorder:
             source: Where the actions come from, in ManiSkill's words (``source_type``).
             source_desc: The same in your own words.
             file_size: Size at which a further h5 file is begun (MB); full ones stay as they are.
+            observed: Whether episodes come with what the task observed in them.
 
         Raises:
             RecordingError: If there is a recording already and neither ``overwrite`` nor
@@ -375,7 +378,8 @@ class Recorder:
         self.json_path = self.path.with_suffix(".json")
         self.parts = self.path.with_suffix(".parts")
         self.damaged: list[str] = []
-        self._header, self._limit = describe_task(task, source, source_desc), file_size * 1e6
+        self._header = describe_task(task, source, source_desc, observed=observed)
+        self._limit = file_size * 1e6
         self._waiting: dict[int, _FinishedEpisode] = {}  # by seed
         self._coming: deque[int] = deque()
         self._given_up = set[int]()
@@ -441,6 +445,11 @@ class Recorder:
                 is one of that seed already, or the recording was closed.
         """
         self.store(episode.seed, self.encoder.encode(episode))
+
+    def add_new(self, episode: PlayedEpisode) -> None:
+        """Write one episode unless there is one of its seed; else as `add`."""
+        if episode.seed not in self.seeds:
+            self.add(episode)
 
     def store(self, seed: int, part: bytes) -> None:
         """Write an episode that the `encoder` encoded, perhaps elsewhere; else as `add`."""
@@ -596,3 +605,24 @@ def _expect_file_or_nothing(path: Path) -> None:
             open_regular(path).close()
         except UnreadableFileError as error:
             raise RecordingError(f"cannot write {path}: {error.strerror}") from error
+
+
+def again(file: Recording, task: TaskEnv, folder: Path) -> Recorder:
+    """Return what records the episodes of a recording again, with what a task observes in them.
+
+    Args:
+        file: The recording.
+        task: The same task, which observes.
+        folder: Where to; episodes that are there already are kept.
+
+    Raises:
+        RecordingError: If the folder cannot be written or holds a recording of something else.
+    """
+    return Recorder(
+        folder / FILE,
+        task,
+        resume=True,
+        source=file.source_type or "scripted",
+        source_desc=f"{task.obs_mode} of a recording",
+        observed=True,
+    )

@@ -17,6 +17,7 @@ from sapien.render import RenderBodyComponent
 
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 
+LAYERED = "minimal"  # the shaders whose images can be laid over each other
 COLOR, PLACE, DEPTH = "Color", "PositionSegmentation", "GbufferDepth"  # SAPIEN's names of images
 
 _PIXEL = {COLOR: np.uint32, PLACE: np.uint64}  # four channels as one number

@@ -25,6 +25,7 @@ from robot_layouts.simulation.sapien3.collision import described_shapes
 from robot_layouts.simulation.sapien3.contacts import (
     ArmContacts,
     PairForces,
+    components_of,
     extents_of,
     overlaps_in,
     presses_on_object,
@@ -173,6 +174,12 @@ class SapienBackend:
         )
 
         return look(self.worlds[env], cameras, textures, markers=markers)
+
+    def segments(self) -> dict[int, Part]:
+        """Return what segmentation's numbers stand for; see `Backend`."""
+        return {
+            component.entity.per_scene_id: part for part, component in components_of(self.worlds[0])
+        }
 
     def inverse_kinematics(self, robot: str) -> InverseKinematics:
         """Return a solver for poses; see `Backend`."""

@@ -158,14 +158,15 @@ def extents_of(world: BuiltWorld) -> dict[Part, Floats]:
     """Return the box around each link and body that collides; see `Backend`."""
     return {
         part: component.get_global_aabb_fast()
-        for part, component in _components(world)
+        for part, component in components_of(world)
         if any(
             not isinstance(s, physx.PhysxCollisionShapePlane) for s in component.collision_shapes
         )
     }
 
 
-def _components(world: BuiltWorld) -> Iterator[tuple[Part, Any]]:
+def components_of(world: BuiltWorld) -> Iterator[tuple[Part, Any]]:
+    """Yield each link and body with SAPIEN's component of it."""
     for robot in world.robots.values():
         for link in robot.links.values():
             yield Part(robot.name, link.name), link

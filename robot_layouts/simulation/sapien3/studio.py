@@ -6,6 +6,7 @@ import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import sapien
 import torch
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from robot_layouts.simulation.sapien3.appearance import (
 )
 from robot_layouts.simulation.sapien3.backdrop import (
     COLOR,
+    LAYERED,
     PLACE,
     Backdrop,
     DrawnBodies,
@@ -27,7 +29,14 @@ from robot_layouts.simulation.sapien3.backdrop import (
 )
 from robot_layouts.simulation.sapien3.device import expect_render_device
 from robot_layouts.simulation.sapien3.world import BuiltWorld
-from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, View, camera_name
+from robot_layouts.simulation.scene.cameras import (
+    RAW,
+    AnyCamera,
+    RobotCamera,
+    View,
+    camera_name,
+    shaders_for,
+)
 from robot_layouts.simulation.scene.looks import AS_DECLARED, LIGHTS, Looks
 from robots import SimulationError
 from robots.descriptor import Vector3
@@ -37,10 +46,28 @@ from robots.descriptor import Vector3
 SKY = (0.3, 0.3, 0.3)
 LAMPS = (((1.0, 1.0, -1.0), (1.0, 1.0, 1.0)), ((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)))
 
-# mani_skill 3.0.1, render/shaders.py, "minimal": what each image holds
-_SHADERS = "minimal"
-_FORMATS = {COLOR: "r8g8b8a8unorm", PLACE: "r16g16b16a16sint"}
-_IMAGES = {"rgb": COLOR, "depth": PLACE, "segmentation": PLACE, "position": PLACE}
+# mani_skill 3.0.1, render/shaders.py: how each pack stores images, and what is taken from them
+_FORMATS = {
+    "minimal": {COLOR: "r8g8b8a8unorm", PLACE: "r16g16b16a16sint"},
+    "default": {COLOR: "r32g32b32a32sfloat"},
+}
+_PIXELS: dict[str, dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[Any]]]]] = {
+    "minimal": {
+        "rgb": (COLOR, lambda x: x[..., :3]),
+        "position": (PLACE, lambda x: x[..., :3]),
+        "depth": (PLACE, lambda x: -x[..., 2:3]),
+        "segmentation": (PLACE, lambda x: x[..., 3:]),
+        **{image: (image, lambda x: x) for image in RAW},
+    },
+    "default": {
+        "rgb": (COLOR, lambda x: _scaled(x, 255, torch.uint8)),
+        "depth": ("Position", lambda x: -_scaled(x, 1000, torch.int16)[..., 2:]),
+        "position": ("Position", lambda x: _scaled(x, 1000, torch.int16)),
+        "segmentation": ("Segmentation", lambda x: x[..., 1:2].astype(np.int64)),
+        "normal": ("Normal", lambda x: x[..., :3]),
+        "albedo": ("Albedo", lambda x: _scaled(x, 255, torch.uint8)),
+    },
+}
 
 Drawn = Callable[[], list[View]]
 """Waits until pictures are drawn, and returns what each camera sees."""
@@ -92,9 +119,10 @@ class Studio:
             self._dress(self._world.looks)
         for marker in self._markers:
             marker.visibility = float(markers)
-        placed = [self._placed(name, camera) for name, camera in cameras.items()]
+        shaders = shaders_for(textures)
+        placed = [self._placed(name, camera, shaders) for name, camera in cameras.items()]
         self._scene.update_render()
-        if markers or not self._bodies.solid:
+        if markers or shaders != LAYERED or not self._bodies.solid:
             return self._whole(placed, textures)
         riding = [isinstance(camera, RobotCamera) for camera in cameras.values()]
         return self._layered(placed, riding, textures)
@@ -104,7 +132,7 @@ class Studio:
         self._bodies.show_all()
         for camera in cameras:
             camera.take_picture()
-        names = {_IMAGES[texture] for texture in textures}
+        names = _images(textures)
         return lambda: [_view(camera, textures, _pictures(camera, names)) for camera in cameras]
 
     def _layered(
@@ -123,7 +151,7 @@ class Studio:
             if camera not in backdrops:
                 self._bodies.show_seen(planes(camera))
                 camera.take_picture()
-        names = {_IMAGES[texture] for texture in textures}
+        names = _images(textures)
 
         def views() -> list[View]:
             found: list[View] = []
@@ -147,9 +175,9 @@ class Studio:
                 self._backdrops[camera] = Backdrop(camera, poses)
         return {camera: self._backdrops[camera] for camera in cameras}
 
-    def _placed(self, name: str, camera: AnyCamera) -> Any:
+    def _placed(self, name: str, camera: AnyCamera, shaders: str) -> Any:
         lens = camera.mount if isinstance(camera, RobotCamera) else camera
-        key = name, lens.width, lens.height, lens.fov, lens.near, lens.far
+        key = shaders, name, lens.width, lens.height, lens.fov, lens.near, lens.far
         if key not in self._cameras:
             self._cameras[key] = self._add_camera(*key)
         placed = self._cameras[key]
@@ -184,14 +212,12 @@ class Studio:
             self._scene.set_ambient_light(light_color(SKY, glow))
         self._bodies, self._backdrops = DrawnBodies(self._world), {}
 
-    def _add_camera(
-        self, name: str, width: int, height: int, fov: float, near: float, far: float
-    ) -> Any:
+    def _add_camera(self, shaders: str, *lens: Any) -> Any:
         # Process-wide, bound when a camera is made; others in this process may have changed them.
-        sapien.render.set_camera_shader_dir(_SHADERS)
-        for image, pixels in _FORMATS.items():
+        sapien.render.set_camera_shader_dir(shaders)
+        for image, pixels in _FORMATS[shaders].items():
             sapien.render.set_picture_format(image, pixels)
-        return self._scene.add_camera(name, width, height, fov, near, far)
+        return self._scene.add_camera(*lens)
 
 
 def _markers(world: BuiltWorld) -> list[Any]:
@@ -202,24 +228,30 @@ def _markers(world: BuiltWorld) -> list[Any]:
     ]
 
 
+def _images(textures: Sequence[str]) -> set[str]:
+    """Return the names of the images that textures are taken from."""
+    pixels = _PIXELS[shaders_for(textures)]
+    return {pixels[texture][0] for texture in textures}
+
+
 def _pictures(camera: Any, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     return {name: camera.get_picture(name) for name in names}
 
 
 def _view(camera: Any, textures: Sequence[str], images: Mapping[str, NDArray[Any]]) -> View:
-    pixels = {texture: images[_IMAGES[texture]] for texture in textures}
-    channels = {
-        "rgb": lambda x: x[..., :3],
-        "depth": lambda x: -x[..., 2:3],
-        "segmentation": lambda x: x[..., 3:],
-        "position": lambda x: x[..., :3],
-    }
+    pixels = _PIXELS[shaders_for(textures)]
+    taken = ((texture, *pixels[texture]) for texture in textures)
     return View(
-        {texture: channels[texture](x) for texture, x in pixels.items()},
+        {texture: values(images[image]) for texture, image, values in taken},
         camera.get_extrinsic_matrix(),
         camera.get_model_matrix(),
         camera.get_intrinsic_matrix(),
     )
+
+
+def _scaled(image: NDArray[Any], factor: int, dtype: torch.dtype) -> NDArray[Any]:
+    """Return three channels in integers; torch's conversion, as what does not fit is undefined."""
+    return (torch.from_numpy(image)[..., :3] * factor).to(dtype).numpy()
 
 
 def look_at(eye: Vector3, target: Vector3) -> sapien.Pose:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,19 @@ from robot_layouts.core.bounds import FAR, checked_number, checked_numbers, chec
 from robots import SimulationError
 from robots.descriptor import CameraMount, Vector3
 
-TEXTURES = ("rgb", "depth", "segmentation", "position")
+TEXTURES = ("rgb", "depth", "segmentation", "position", "normal", "albedo")
 """What a camera can tell of each pixel, in ManiSkill's words: colour, distance along the view (mm),
-number of the body or link, place in the camera's frame (mm)."""
+number of the body or link, place in the camera's frame (mm), direction of the surface in that
+frame, colour without light."""
+
+RAW = ("Color", "PositionSegmentation")
+"""The images from which the quick shaders' pixels are taken, all four channels of each."""
+
+# mani_skill 3.0.1, render/shaders.py: what each pack of shaders tells, in native's order
+SHADERS = {
+    "minimal": ("rgb", "position", "depth", "segmentation", *RAW),
+    "default": ("rgb", "depth", "position", "segmentation", "normal", "albedo"),
+}
 
 _MOST_PIXELS = 16384  # of a side; what graphics drivers draw at most
 _NARROW = 1e-3  # rad, between a field of view and none or a half-turn
@@ -98,7 +109,13 @@ def camera_name(camera: AnyCamera) -> str:
     return camera.name
 
 
-Texture = NDArray[np.uint8] | NDArray[np.int16]  # (H, W, 3) or (H, W, 1)
+def shaders_for(textures: Iterable[str]) -> str:
+    """Return the first of `SHADERS` that tells all of this; one of them does."""
+    wanted = set(textures)
+    return next(pack for pack, told in SHADERS.items() if wanted.issubset(told))
+
+
+Texture = NDArray[Any]  # (H, W, k)
 
 
 @dataclass(frozen=True)
@@ -106,8 +123,9 @@ class View:
     """What one camera tells of one world.
 
     Attributes:
-        images: Texture → image: ``rgb`` (H, W, 3) uint8, ``depth`` (H, W, 1) int16 (mm),
-            ``segmentation`` (H, W, 1) int16, ``position`` (H, W, 3) int16 (mm).
+        images: Texture → image: ``rgb`` and ``albedo`` (H, W, 3) uint8, ``depth`` (H, W, 1) int16
+            (mm), ``position`` (H, W, 3) int16 (mm), ``normal`` (H, W, 3) float32, ``segmentation``
+            (H, W, 1) int16, beside a normal or an albedo int64; of `RAW` (H, W, 4) uint8 and int16.
         extrinsic_cv: World to camera, which looks along +z with y down, (3, 4).
         cam2world_gl: Camera, which looks along -z with y up, to world, (4, 4).
         intrinsic_cv: Camera to pixels, (3, 3).
