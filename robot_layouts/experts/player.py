@@ -53,9 +53,7 @@ class Player:
             alone: Tells whether it is inside itself.
         """
         self._robot, self._waypoints = robot, list(waypoints)
-        self._driver = ArmDriver(
-            task.layout.arm(robot).robot, 1 / task.scenario.control_frequency
-        )
+        self._driver = ArmDriver(task.layout.arm(robot).robot, 1 / task.scenario.control_frequency)
         if any(waypoint.to is not None for waypoint in waypoints):
             self._kinematics = pose_solver(task, robot)
         if any((waypoint.to or waypoint.joints) is not None for waypoint in waypoints):

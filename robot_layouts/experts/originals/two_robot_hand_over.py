@@ -298,7 +298,9 @@ class _Search:
         # In proportion to its weight: a light cube that is pressed harder slips out.
         force = max(FORCE * self._fit.scale**3, LEAST_FORCE)
         give_share, take_share = self._shares
-        give_near, take_near = (NEAR * self._edge / hand.length for hand in (self._giver, self._taker))
+        give_near, take_near = (
+            NEAR * self._edge / hand.length for hand in (self._giver, self._taker)
+        )
         picked = self._giver.turns(meeting.pick[None])[0]
         back = partial(self._off, self._giver, meeting.pick, picked, give_share)
         return {
