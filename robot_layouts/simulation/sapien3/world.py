@@ -128,7 +128,9 @@ class BuiltWorld:
         self.robots: dict[str, SimulatedRobot] = {}
         for number, (name, placement) in enumerate(layout.items()):
             if name not in blueprints:
-                blueprints[name] = read_blueprint(placement.robot, visuals=visuals)
+                robot, known = placement.robot, blueprints.items()
+                alike = (other for one, other in known if layout[one].robot == robot)
+                blueprints[name] = next(alike, None) or read_blueprint(robot, visuals=visuals)
             blueprint = blueprints[name]
             self.robots[name] = SimulatedRobot(
                 self.scene, name, placement, blueprint, number, links_pass=links_pass
