@@ -67,7 +67,7 @@ class ArmDriver:
         """Return the factor on each joint's error with which its drive does not overshoot."""
         stiffness, damping = np.array(group.stiffness), np.maximum(group.damping, _LEAST_DAMPING)
         follows = 1 - np.exp(-self._seconds * stiffness / damping)
-        return np.minimum(GAIN, 1 / np.maximum(follows, 1 / GAIN))
+        return 1 / np.maximum(follows, 1 / GAIN)
 
     def _squeezing(self, force: float, qpos: Floats) -> float:
         """Return the share towards which the gripper presses with a force, by its drives."""

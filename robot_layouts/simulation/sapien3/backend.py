@@ -35,7 +35,7 @@ from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world, vary
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.world import Placements, World
-from robots import SimulationError
+from robots import RobotDescriptor, SimulationError
 
 _STILL = np.zeros(3, np.float32)
 
@@ -50,7 +50,7 @@ class SapienBackend:
     def __init__(self) -> None:
         """Begin without worlds."""
         self.worlds: list[BuiltWorld] = []
-        self._blueprints: dict[str, Blueprint] = {}
+        self._blueprints: dict[RobotDescriptor, Blueprint] = {}
         self._arms: dict[BuiltWorld, ArmContacts] | None = None
 
     def build(self, worlds: Mapping[int, World]) -> Built:
@@ -193,8 +193,9 @@ class SapienBackend:
         self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
     ) -> PinocchioFollower:
         """Return what follows poses of a link; see `Backend`."""
-        urdf = self._blueprints[robot].contents
-        return PinocchioFollower(self.worlds[0].robots[robot], urdf, link, root_link, joints)
+        world = self.worlds[0]
+        urdf = self._blueprints[world.layout[robot].robot].contents
+        return PinocchioFollower(world.robots[robot], urdf, link, root_link, joints)
 
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch; see `Backend`."""

@@ -1,6 +1,6 @@
 """Gives a robot to SAPIEN's builder of articulations, as the model of its URDF describes it.
 
-SAPIEN's own URDF loader would read the file a second time, with libraries that are slow to load.
+SAPIEN's own URDF loader would read the file a second time, by another parser.
 What is built here has its numbers to the last bit: poses are composed in its order of operations.
 """
 

@@ -22,7 +22,7 @@ from robot_layouts.simulation.scene.parts import Part
 from robot_layouts.simulation.scene.shapes import Shape
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.world import World, WorldBody
-from robots import SimulationError
+from robots import RobotDescriptor, SimulationError
 
 _Value = TypeVar("_Value")
 
@@ -93,7 +93,7 @@ class BuiltWorld:
         physics: PhysicsSettings | None = None,
         *,
         visuals: bool = False,
-        blueprints: dict[str, Blueprint] | None = None,
+        blueprints: dict[RobotDescriptor, Blueprint] | None = None,
         links_pass: bool = False,
     ) -> None:
         """Build the robots of a layout.
@@ -103,7 +103,7 @@ class BuiltWorld:
             physics: Solver settings; None keeps SAPIEN's own defaults.
             visuals: Whether to build what pictures need (a Vulkan driver must be present).
             blueprints: What was read of the robots for an earlier world that is like this one,
-                by name; what is missing is read and added.
+                by descriptor; what is missing is read and added.
             links_pass: See `robot_layouts.simulation.World`.
 
         Raises:
@@ -127,13 +127,11 @@ class BuiltWorld:
         blueprints = {} if blueprints is None else blueprints
         self.robots: dict[str, SimulatedRobot] = {}
         for number, (name, placement) in enumerate(layout.items()):
-            if name not in blueprints:
-                robot, known = placement.robot, blueprints.items()
-                alike = (other for one, other in known if layout[one].robot == robot)
-                blueprints[name] = next(alike, None) or read_blueprint(robot, visuals=visuals)
-            blueprint = blueprints[name]
+            robot = placement.robot
+            if robot not in blueprints:
+                blueprints[robot] = read_blueprint(robot, visuals=visuals)
             self.robots[name] = SimulatedRobot(
-                self.scene, name, placement, blueprint, number, links_pass=links_pass
+                self.scene, name, placement, blueprints[robot], number, links_pass=links_pass
             )
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, BuiltBody] = {}
@@ -215,7 +213,7 @@ class BuiltWorld:
             body.entity.set_pose(_on_its_place(body.declared, body.component, pose))
 
 
-def build_world(world: World, blueprints: dict[str, Blueprint]) -> BuiltWorld:
+def build_world(world: World, blueprints: dict[RobotDescriptor, Blueprint]) -> BuiltWorld:
     """Build what a task declared; see `BuiltWorld` for the arguments and errors."""
     built = BuiltWorld(
         world.layout,
