@@ -44,6 +44,7 @@ class GripperMotion:
     Attributes:
         joints: Names of the gripper's joints.
         openings: Distance of the two pads at evenly spaced shares from 0 to 1, (65,) (m).
+        angles: How far they are turned against each other there, from where they meet, (65,) (rad).
         turn: Orientation of the gripper's frame in the TCP link's, (3, 3): its y axis is the way in
             which the pads part at first, whatever `robots.Fingers` says of contact forces.
     """
@@ -89,6 +90,8 @@ class GripperMotion:
         )
         self._middles = (one + other) / 2
         self.openings = np.linalg.norm(one - other, axis=1)
+        first, second = (poses[:, finger, :3, :3] for finger in fingers)
+        self.angles = _turned(np.swapaxes(first, 1, 2) @ second)
         wrist = transform(hand[0], poses[0, _wrist(robot, tree), :3, 3])
         self.turn = _axes(self._middles[0] - wrist, (one - other)[_AJAR])
 
@@ -96,6 +99,10 @@ class GripperMotion:
     def widest(self) -> float:
         """How far the pads get apart (m)."""
         return float(self.openings.max())
+
+    def widest_within(self, angle: float) -> float:
+        """Return how far the pads get apart while they are turned by less than an angle (m)."""
+        return float(self.openings[self.angles < angle].max(initial=0.0))
 
     def share(self, opening: float) -> float:
         """Return the least share at which the pads are so far apart (m); 1 if they never are."""
@@ -136,6 +143,12 @@ class GripperMotion:
 
     def _positions(self, shares: Floats) -> Floats:
         return np.asarray(self._ends[:, 0] + shares[:, None] * self._travels)
+
+
+def _turned(rotations: Floats) -> Floats:
+    """Return by how much rotations, (n, 3, 3), differ from the first of them, (n,) (rad)."""
+    traces = np.trace(rotations[0].T @ rotations, axis1=1, axis2=2)
+    return np.arccos(np.clip((traces - 1) / 2, -1.0, 1.0))
 
 
 @lru_cache(maxsize=64)

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
+from layouts import single
 from robot_layouts.experts.script import Scene
-from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, rotation_about
+from robot_layouts.kinematics.rotations import (
+    Floats,
+    inverse_pose,
+    pose_matrix,
+    quaternion_of,
+    rotation_about,
+)
 from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
+from robot_layouts.simulation.checks.closing import Closing
+from robot_layouts.simulation.checks.trial import NAME
+from robots import RobotDescriptor
 from robots.gripper_motion import gripper_motion, link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
@@ -22,6 +33,8 @@ TURN_WORTH = 0.02  # m that a turn by 1 rad is worth to an arm of fewer joints
 FIRST_ITERATIONS, ITERATIONS = 12, 30
 NEAR, NEAR_TURN = 0.1, 0.8  # m and rad from a goal after the first of them
 RANDOM_STARTS = 3
+WIDER = (1.45, 2.0)  # than a cube a gripper is open before it closes
+SLIPS = 0.1  # of a cube's side that it may move in a hand that is shaken
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +44,7 @@ class HandPostures:
     Attributes:
         which: Number of the pose that each was asked for, (k,).
         qpos: All joints of the robot, (k, dof) (rad, m).
-        turns: Orientation of the gripper's frame that each gives it, (k, 3, 3), world.
+        turns: Orientation of the frame that was to be brought there, (k, 3, 3), world.
         off: By how much that is turned otherwise than was asked for, (k,) (rad).
     """
 
@@ -47,6 +60,22 @@ class HandPostures:
     def __getitem__(self, some: NDArray[np.intp]) -> HandPostures:
         """Return some of them, in that order."""
         return HandPostures(self.which[some], self.qpos[some], self.turns[some], self.off[some])
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """How a gripper holds a box.
+
+    Attributes:
+        pose: Of the box in the TCP link's frame before it closes, (4, 4) (m): its y axis runs from
+            finger to finger, and its z axis about as the gripper points.
+        share: How far the gripper is open before it closes.
+        held: How far it is open when it holds the box.
+    """
+
+    pose: Floats
+    share: float
+    held: float
 
 
 class Hand:
@@ -71,6 +100,7 @@ class Hand:
         layout = task.standing()
         own, self.owner = layout.arm(arm).robot, layout.owner(arm)
         robot = layout[self.owner].robot
+        self._robot, self._limb = robot, layout.arm_name(arm).removeprefix(self.owner)
         self.arm, self.motion, self.length = arm, gripper_motion(own), own.reach
         self.columns = [robot.joints.index(joint) for joint in own.arm_joints]
         self._gripper = [robot.joints.index(joint) for joint in self.motion.joints]
@@ -82,6 +112,19 @@ class Hand:
         few = len(self.columns) < FULL
         self._turn, self._worth = (ROUGH_TURN, TURN_WORTH) if few else (TURN, 1.0)
         self._random = scattered(self._tree.limits[self.columns], RANDOM_STARTS)
+
+    def grip(self, side: float, depth: float) -> Grip | None:
+        """Return how it holds a cube, as it was seen to in physics; None if it does not.
+
+        Args:
+            side: Of the cube (m).
+            depth: How far before the middle of its pads the cube's middle is when they close, as a
+                share of its side.
+
+        Raises:
+            RobotLayoutsError: If the robot cannot be built.
+        """
+        return _grip(self._robot, self._limb, round(side, 6), depth)
 
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""
@@ -106,26 +149,31 @@ class Hand:
         return self.link(qpos)[:, :3, :3] @ self.motion.turn
 
     def held(self, scene: Scene, body: str) -> Floats:
-        """Return where a body's origin is in the TCP link's frame, (3,) (m)."""
-        pose = inverse_pose(self.link(self.qpos(scene)[None])[0]) @ pose_matrix(*scene.body(body))
-        return pose[:3, 3]
+        """Return the pose of a body in the TCP link's frame, (4, 4) (m)."""
+        return inverse_pose(self.link(self.qpos(scene)[None])[0]) @ pose_matrix(*scene.body(body))
+
+    def pointing(self, place: Floats) -> Floats:
+        """Return the gripper's frame with its origin at a place, in the TCP link's, (4, 4) (m)."""
+        frame = np.eye(4)
+        frame[:3, :3], frame[:3, 3] = self.motion.turn, place
+        return frame
 
     def reach(
         self,
         places: Floats,
         turns: Floats,
-        point: Floats,
+        frame: Floats,
         starts: Floats,
         *,
         scatter: bool = True,
         loose: bool = False,
     ) -> HandPostures:
-        """Return the postures that bring a point of the TCP link to places, for each at most one.
+        """Return the postures that bring a frame of the TCP link to poses, for each at most one.
 
         Args:
-            places: Where the point is to be, (n, 3) (m, world).
-            turns: How the gripper's frame is to be turned there, (n, 3, 3), world.
-            point: In the TCP link's frame, (3,) (m).
+            places: Where its origin is to be, (n, 3) (m, world).
+            turns: How it is to be turned there, (n, 3, 3), world.
+            frame: Its pose in the TCP link's frame, (4, 4) (m).
             starts: Postures to begin from, (s, dof) (rad, m); that which comes nearest to the first
                 of them is returned.
             scatter: Whether to begin from a few random postures as well.
@@ -140,9 +188,9 @@ class Hand:
         goal = IkGoal(
             np.repeat(places @ root[:3, :3].T + root[:3, 3], s, axis=0),
             (self._tcp.turned,),
-            np.repeat(root[:3, :3] @ turns @ self.motion.turn.T, s, axis=0),
+            np.repeat(root[:3, :3] @ turns @ frame[:3, :3].T, s, axis=0),
             self._tcp.turned,
-            point,
+            frame[:3, 3],
         )
         qpos = self._descended(goal, np.tile(starts, (n, 1)), TURN_WORTH if loose else self._worth)
         missing, turned = shortfalls(self._tree, goal, qpos)
@@ -151,7 +199,8 @@ class Hand:
         ways = np.where(fits, ways, np.inf).reshape(n, s)
         which = np.flatnonzero(np.isfinite(ways.min(axis=1)))
         chosen = which * s + ways.argmin(axis=1)[which]
-        return HandPostures(which, qpos[chosen], self.turns(qpos[chosen]), turned[chosen])
+        reached = self.link(qpos[chosen])[:, :3, :3] @ frame[:3, :3]
+        return HandPostures(which, qpos[chosen], reached, turned[chosen])
 
     def _descended(self, goal: IkGoal, rows: Floats, worth: float) -> Floats:
         """Bring rows of postures towards a goal; those that are far from it soon are left there."""
@@ -168,6 +217,28 @@ class Hand:
     def way(self, one: Floats, other: Floats) -> Floats:
         """Return how far the joint has to turn that turns farthest, (k,) (rad)."""
         return np.abs(one - other)[..., self.columns].max(axis=-1)
+
+
+@lru_cache(maxsize=64)
+def _grip(robot: RobotDescriptor, limb: str, side: float, depth: float) -> Grip | None:
+    """See `Hand.grip`; the limb is what its name adds to the robot's."""
+    layout = single({NAME: robot})
+    own, closing = layout.arm(NAME + limb).robot, Closing(layout, NAME + limb)
+    motion, tree = gripper_motion(own), link_tree(robot)
+    gripper = [robot.joints.index(joint) for joint in motion.joints]
+    base, tcp = layout[NAME].base_pose, find_tcp(own, tree).turned
+    for wide in WIDER:
+        share, qpos = motion.share(wide * side), np.array(layout[NAME].start_qpos, float)
+        qpos[gripper] = motion.positions(share)
+        pose = np.eye(4)
+        pose[:3, :3] = motion.turn
+        pose[:3, 3] = motion.middle(share) + depth * side * motion.turn[:, 2]
+        link = pose_matrix(base.position, base.quaternion) @ tree.forward(qpos[None])[0, tcp]
+        cube = link @ pose
+        closed = closing.close(qpos, (cube[:3, 3], quaternion_of(cube[:3, :3])), side)
+        if closed.held and max(closed.pushed, closed.slipped) < SLIPS * side:
+            return Grip(pose, share, closed.share)
+    return None
 
 
 def box_grips(turn: Floats, around: int = 12) -> Floats:

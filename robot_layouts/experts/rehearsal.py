@@ -92,11 +92,13 @@ class Rehearsal:
         self._watch = ArmWatch(self.task, strict=False) if several else None
         self._alone = RobotsAlone(self.task.layout, scenario.physics)
         self._tape: EpisodeTape | None = None
+        self.fresh = False  # whether an episode has begun, in which nothing was done yet
 
     def begin(self, seed: int) -> Scene:
         """Start the episode of a seed in a freshly built world, and return what it looks like."""
         self.task.reset(seed, options=REBUILT)
         self._tape = EpisodeTape(self.task, seed)
+        self.fresh = True
         return self.scene()
 
     def scene(self) -> Scene:
@@ -109,6 +111,7 @@ class Rehearsal:
         Returns:
             Whether the task is solved then, and which arms touched in it, in words.
         """
+        self.fresh = False
         moment = take_step(self.task, action)
         if self._tape is not None:
             self._tape.add(action, moment)
@@ -126,7 +129,7 @@ class Rehearsal:
         episode = self._tape.read()
         return episode if np.array_equal(episode.actions, actions) else None
 
-    def play(self, script: Script, *, around: bool = False) -> Attempt:
+    def play(self, script: Script, *, around: bool = False, until: str | None = None) -> Attempt:
         """Play a script from the present state until success or the end of the episode.
 
         It fails as soon as two arms touch: robots, or limbs of one robot.
@@ -135,6 +138,7 @@ class Rehearsal:
             script: Waypoints by robot; robots left out keep still.
             around: Whether arms go round what is in their way, or wait until it is gone. Otherwise
                 their joints go straight to each waypoint.
+            until: A waypoint, ``"robot.name"``; once it is done, that is success.
 
         Raises:
             MissingPackageError: If that takes the extra ``motion``, which is not installed.
@@ -156,6 +160,8 @@ class Rehearsal:
             except StuckError as error:
                 blocked = isinstance(error, BlockedError)
                 return Attempt(_stack(actions, task), False, str(error), blocked)
+            if until in done:
+                return Attempt(_stack(actions, task), True)
             actions.append(np.concatenate(parts).astype(np.float32))
             solved, touching = self.step(actions[-1])
             scene = self.scene()
@@ -209,23 +215,36 @@ def first_success(task: TaskEnv, seed: int, scripts: Callable[[Scene], Iterable[
     Raises:
         TaskError: If no script could even be begun.
     """
+    return search(task, seed, lambda copy: tried(copy, seed, scripts(copy.begin(seed))))
 
-    def attempts(rehearsal: Rehearsal) -> Iterator[Attempt]:
-        obstructed: list[Script] = []
-        for i, script in enumerate(scripts(rehearsal.begin(seed))):
-            if i > 0:
-                rehearsal.begin(seed)
-            attempt = rehearsal.play(script)
-            if attempt.obstructed:
-                obstructed.append(script)
-                attempt = replace(attempt, reason=attempt.reason + without_planner())
-            yield attempt
-        if not without_planner():
-            for script in obstructed:
-                rehearsal.begin(seed)
-                yield rehearsal.play(script, around=True)
 
-    return search(task, seed, attempts)
+def tried(
+    rehearsal: Rehearsal, seed: int, scripts: Iterable[Script | Attempt]
+) -> Iterator[Attempt]:
+    """Yield an attempt with each script in turn, then with ways round what was in the way.
+
+    Args:
+        rehearsal: Where they are tried; each begins the episode anew.
+        seed: The episode.
+        scripts: The scripts, the best first; attempts that failed while they were looked for are
+            yielded as they are.
+    """
+    obstructed: list[Script] = []
+    for script in scripts:
+        if isinstance(script, Attempt):
+            yield script
+            continue
+        if not rehearsal.fresh:
+            rehearsal.begin(seed)
+        attempt = rehearsal.play(script)
+        if attempt.obstructed:
+            obstructed.append(script)
+            attempt = replace(attempt, reason=attempt.reason + without_planner())
+        yield attempt
+    if not without_planner():
+        for script in obstructed:
+            rehearsal.begin(seed)
+            yield rehearsal.play(script, around=True)
 
 
 def search(task: TaskEnv, seed: int, attempts: Callable[[Rehearsal], Iterable[Attempt]]) -> Plan:

@@ -31,6 +31,7 @@ _HEIGHT = 0.35  # of the shorter reach: how high above the ground places are loo
 _OFTEN = 3  # samples in a cell and its neighbours that show it to be well within reach
 _ROOM = 0.04  # m that a declaration for a Panda needs about its origin, in reach of all arms
 _HELD = 0.75  # of a gripper's opening that a body to be held may take
+_SPLAYED = 0.3  # rad; between jaws that are turned more a body is held by its edges, and slips out
 _LARGEST, _SMALLEST = 3.0, 0.05
 
 
@@ -98,9 +99,8 @@ def fit_to(layout: Layout, declared: Layout, held: float) -> Fit:
     if all(_alike(*pair) for pair in zip(arms, own, strict=True)):
         return AS_DECLARED
     scale = min(a.robot.reach for a in arms) / min(a.robot.reach for a in own)
-    openings = [opening for arm in arms if (opening := _opening(arm.robot)) is not None]
     if held:
-        scale = min([scale, *(_HELD * opening / held for opening in openings)])
+        scale = min([scale, *(_holds(arm.robot) / held for arm in arms if _opening(arm.robot))])
     (x, y), room = shared_place(layout, tuple(declared.places))
     scale = min(scale, room / _ROOM)
     (x0, y0, _), (x1, y1, _) = (arm.base_position for arm in (arms[0], arms[-1]))
@@ -159,6 +159,12 @@ def _opening(robot: RobotDescriptor) -> float | None:
         return round(gripper_motion(robot).widest, 4)
     except DescriptorError:
         return None
+
+
+def _holds(robot: RobotDescriptor) -> float:
+    """Return the width of the widest body that a gripper holds well (m)."""
+    motion = gripper_motion(robot)
+    return min(_HELD * motion.widest, motion.widest_within(_SPLAYED))
 
 
 def _near_ground(layout: Layout, place: str, height: float) -> Floats:

@@ -13,10 +13,15 @@ from numpy.typing import NDArray
 
 from robot_layouts.experts.geometry import gripper_facing, heading
 from robot_layouts.experts.grasps import need_fingers
-from robot_layouts.experts.hands import Hand, HandPostures, between, box_grips, offsets
-from robot_layouts.experts.rehearsal import first_success
+from robot_layouts.experts.hands import Grip, Hand, HandPostures, between, box_grips, offsets
+from robot_layouts.experts.rehearsal import Attempt, Rehearsal, search, tried
 from robot_layouts.experts.script import Scene, Script, Waypoint
-from robot_layouts.kinematics.rotations import Floats, pose_matrix, rotation_about, rotation_of
+from robot_layouts.kinematics.rotations import (
+    Floats,
+    pose_matrix,
+    rotation_about,
+    rotation_of,
+)
 from robot_layouts.simulation.checks.overlaps import RobotsAlone
 from robot_layouts.simulation.scene.parts import Part
 from robots import TaskError
@@ -29,7 +34,6 @@ GIVER, TAKER, CUBE, GOAL = "left", "right", "cube", "goal_site"
 DEPTHS = (0.2, -0.1, -0.35)
 OWN_HALF = 0.1  # the least depth at which each holds its own half
 NEAR = 0.3  # how far from its place a gripper may be when it closes or waits
-SLACK = 0.45  # how much wider than the cube a gripper is open
 
 # Lengths for a Panda (m), as the task fits others.
 BACK, LIFT, RETREAT = 0.07, 0.04, 0.1
@@ -61,18 +65,48 @@ def hand_over(task: TaskEnv, seed: int) -> NDArray[np.float32]:
             it says which, and what lacks.
     """
     need_fingers(task, "the hand-over", GIVER, TAKER)
+    return search(task, seed, lambda copy: tried(copy, seed, _scripts(task, seed, copy)))
 
-    def scripts(scene: Scene) -> Iterator[Script]:
-        reasons: list[TaskError] = []
-        for depth in DEPTHS:
-            try:
-                yield from _Search(task, scene, depth).scripts()
-            except TaskError as error:
-                reasons.append(error)
-        if len(reasons) == len(DEPTHS):
-            raise reasons[0]
 
-    return first_success(task, seed, scripts)
+def _scripts(task: TaskEnv, seed: int, copy: Rehearsal) -> Iterator[Script | Attempt]:
+    """Yield scripts that begin with a pick that was seen to lift the cube; also picks that do not.
+
+    Raises:
+        TaskError: If there is nothing to try.
+    """
+    find = _Search(task, copy.begin(seed))
+    reasons, yielded = list[TaskError](), False
+    for pick in find.picks():
+        copy.begin(seed)
+        attempt = copy.play({GIVER: find.picking(pick)}, until=f"{GIVER}.lift")
+        if not attempt.success:
+            yield attempt
+            yielded = True
+            continue
+        try:
+            yield from find.scripts(pick, copy.scene())
+            yielded = True
+        except TaskError as error:
+            reasons.append(error)
+    if not yielded:
+        raise reasons[0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Pick:
+    """How the giver holds the cube as it lies.
+
+    Attributes:
+        qpos: All joints of its robot then, (dof,) (rad, m).
+        turn: How the grip's frame is turned, (3, 3), world.
+        grip: How the cube lies in its hand.
+        depth: Of that, one of `DEPTHS`.
+    """
+
+    qpos: Floats
+    turn: Floats
+    grip: Grip
+    depth: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,20 +114,20 @@ class _Exchange:
     """How the cube changes hands.
 
     Attributes:
-        pick: Posture of the giver when it holds the cube on the table, (dof,) (rad, m).
-        give: The same where it gives it.
-        turn: Orientation of the giver's gripper there, (3, 3).
+        give: Posture of the giver where it gives the cube, (dof,) (rad, m).
+        turn: Orientation of its gripper there, (3, 3).
         take: Posture of the taker there.
-        grip: Orientation of the taker's gripper in the cube's frame, (3, 3).
+        grip: How the cube lies in the taker's hand.
+        turned: How that grip's frame is turned, (3, 3).
         place: Of the cube, (3,) (m).
         cost: How far the arms have to go, and how near the hands are (rad).
     """
 
-    pick: Floats
     give: Floats
     turn: Floats
     take: Floats
-    grip: Floats
+    grip: Grip
+    turned: Floats
     place: Floats
     cost: float
 
@@ -101,14 +135,14 @@ class _Exchange:
 class _Search:
     """What a scene lets two hands do."""
 
-    def __init__(self, task: TaskEnv, scene: Scene, depth: float) -> None:
+    def __init__(self, task: TaskEnv, scene: Scene) -> None:
         self._scene = scene
         self._giver, self._taker = Hand(task, GIVER), Hand(task, TAKER)
         self._fit = task.fit
         self._cube = pose_matrix(*scene.body(CUBE))
         self._edge = 2 * float(np.min(_half_size(scene)))
-        self._before, self._crosswise = depth * self._edge, depth < OWN_HALF
-        self._shares = [self._share(hand) for hand in (self._giver, self._taker)]
+        for hand in (self._giver, self._taker):
+            self._check_opening(hand)
         self._alone = RobotsAlone(
             task.standing(),
             task.scenario.physics,
@@ -116,76 +150,90 @@ class _Search:
         )
         self._usual = self._parts({})
 
-    def scripts(self) -> list[Script]:
-        """Return the scripts to try, the most promising first.
+    def picks(self) -> Iterator[_Pick]:
+        """Yield ways to hold the cube as it lies, the most promising first.
 
         Raises:
             TaskError: If there are none.
         """
-        picks = self._picks()
-        meetings = sorted(self._meetings(picks), key=lambda meeting: meeting.cost)
+        found = False
+        for grip, depth in self._grips(self._giver, *DEPTHS):
+            postures = self._picks(grip)
+            for row in self._free_picks(postures):
+                found = True
+                yield _Pick(postures.qpos[row], postures.turns[row], grip, depth)
+        if not found:
+            raise TaskError(f"{GIVER!r} cannot reach the cube with its gripper")
+
+    def scripts(self, pick: _Pick, lifted: Scene) -> list[Script]:
+        """Return the scripts to try, the most promising first.
+
+        Args:
+            pick: How the giver picks the cube.
+            lifted: What is seen once it has.
+
+        Raises:
+            TaskError: If there are none.
+        """
+        now, held = self._giver.qpos(lifted), self._giver.held(lifted, CUBE)
+        meetings = sorted(self._meetings(pick, now, held), key=lambda meeting: meeting.cost)
         if not meetings:
             raise TaskError(
                 f"{TAKER!r} cannot take the cube from {GIVER!r} in any of the ways that were tried;"
                 " stand them nearer to each other, or turn them towards one another"
             )
         taker = self._taker
-        point = taker.motion.middle(taker.motion.share(self._edge))
-        if not len(self._ends(point, taker.qpos(self._scene)[None])):
+        if not len(self._ends(meetings[0].grip.pose, taker.qpos(self._scene)[None])):
             raise TaskError(f"{TAKER!r} cannot reach the goal with its gripper")
-        found = list(islice(filter(self._is_free, meetings), SCRIPTS))
+        free = (meeting for meeting in meetings if self._is_free(now, pick, meeting))
+        found = list(islice(free, SCRIPTS))
         if not found:
             raise TaskError(
                 f"wherever {TAKER!r} can take the cube from {GIVER!r}, their hands overlap; stand"
                 " them a little farther apart"
             )
-        return [self._script(meeting) for meeting in found]
+        return [self._script(pick, meeting) for meeting in found]
 
-    def _share(self, hand: Hand) -> float:
-        """Return how far a hand opens for the cube.
+    def _check_opening(self, hand: Hand) -> None:
+        """Refuse a hand that the cube does not fit in.
 
         Raises:
-            TaskError: If it cannot.
+            TaskError: If it is too wide.
         """
         if hand.motion.widest < 1.05 * self._edge:
             raise TaskError(
                 f"the gripper of {hand.arm!r} opens {1e3 * hand.motion.widest:.0f} mm, and the cube"
                 f" is {1e3 * self._edge:.0f} mm wide"
             )
-        return hand.motion.share((1 + SLACK) * self._edge)
 
-    def _picks(self) -> HandPostures:
+    def _grips(self, hand: Hand, *depths: float) -> Iterator[tuple[Grip, float]]:
+        """Yield how a hand holds the cube, at the depths at which it does, in their order.
+
+        Raises:
+            TaskError: If it does at none.
+        """
+        found = False
+        for depth in depths:
+            if (grip := hand.grip(self._edge, depth)) is not None:
+                found = True
+                yield grip, depth
+        if not found:
+            raise TaskError(
+                f"the gripper of {hand.arm!r} closes on a cube of {1e3 * self._edge:.3g} mm without"
+                " holding it; robot-layouts robots inspect ROBOT --try says how it grasps"
+            )
+
+    def _picks(self, grip: Grip) -> HandPostures:
         """Return postures in which the giver holds the cube as it lies, the best first."""
-        hand, share = self._giver, self._shares[0]
+        hand = self._giver
         turns = box_grips(self._cube[:3, :3])
         level = np.abs(turns[:, 2, 1]) < 0.5  # the fingers part along the table
         turns = turns[level & (turns[:, 2, 2] < UPWARD)]
-        starts = hand.opened(hand.qpos(self._scene), share)[None]
-        point = hand.motion.middle(share)
-        places = self._cube[:3, 3] + offsets(turns, self._before)
-        picks = hand.reach(places, turns, point, starts)
-        if not len(picks):
-            raise TaskError(f"{GIVER!r} cannot reach the cube with its gripper")
+        starts = hand.opened(hand.qpos(self._scene), grip.share)[None]
+        places = np.tile(self._cube[:3, 3], (len(turns), 1))
+        picks = hand.reach(places, turns, grip.pose, starts)
         down = 1 + picks.turns[:, 2, 2]
         return picks[np.argsort(hand.way(picks.qpos, starts[0]) + down + ALIGNED * picks.off)]
-
-    def _meetings(self, picks: HandPostures) -> Iterator[_Exchange]:
-        giver = self._giver
-        ground = [self._fit.place((0.0, aside, height)) for height in HEIGHTS for aside in ASIDE]
-        middles = np.array(ground)
-        ways = heading(giver.base[:3, 3], middles.mean(axis=0))
-        turned = _gripper_turns(ways, LEANS)
-        turns = np.tile(turned, (len(middles), 1, 1))
-        middle = np.repeat(middles, len(turned), axis=0)
-        point = giver.motion.middle(giver.motion.share(self._edge))
-        for pick in self._free_picks(picks):
-            places = middle + offsets(turns, self._before)
-            gives = giver.reach(places, turns, point, picks.qpos[pick][None])
-            ways_there = giver.way(gives.qpos, picks.qpos[pick])
-            some = np.argsort(ways_there)[:MEETINGS]
-            # The cube is turned with the gripper that holds it.
-            cube_turns = gives.turns[some] @ picks.turns[pick].T @ self._cube[:3, :3]
-            yield from self._takes(picks.qpos[pick], gives, some, cube_turns, middle)
 
     def _free_picks(self, picks: HandPostures) -> list[int]:
         """Return the first picks in which the giver touches nothing but the cube."""
@@ -193,58 +241,66 @@ class _Search:
         found = list(islice(free, PICKS))
         return found or list(range(min(PICKS, len(picks))))
 
+    def _meetings(self, pick: _Pick, now: Floats, held: Floats) -> Iterator[_Exchange]:
+        """Yield where the giver may give the cube, and the taker take it.
+
+        Args:
+            pick: How the giver picked it.
+            now: Posture of the giver with the cube lifted, (dof,) (rad, m).
+            held: Pose of the cube in its TCP link's frame, (4, 4) (m).
+        """
+        giver = self._giver
+        ground = [self._fit.place((0.0, aside, height)) for height in HEIGHTS for aside in ASIDE]
+        middles = np.array(ground)
+        turned = _gripper_turns(heading(giver.base[:3, 3], middles.mean(axis=0)), LEANS)
+        gives = giver.reach(
+            np.repeat(middles, len(turned), axis=0),
+            np.tile(turned, (len(middles), 1, 1)),
+            giver.pointing(held[:3, 3]),
+            now[None],
+        )
+        gives = gives[np.argsort(giver.way(gives.qpos, now))[:MEETINGS]]
+        yield from self._takes(pick.depth, now, gives, giver.link(gives.qpos) @ held)
+
     def _takes(
-        self,
-        pick: Floats,
-        gives: HandPostures,
-        some: NDArray[np.intp],
-        cube_turns: Floats,
-        middle: Floats,
+        self, depth: float, now: Floats, gives: HandPostures, cubes: Floats
     ) -> Iterator[_Exchange]:
         """Yield the meetings in which the taker can hold the cube, where the giver gives it."""
-        taker, share = self._taker, self._shares[1]
-        start = taker.opened(taker.qpos(self._scene), share)
-        rows: list[tuple[int, Floats]] = []
-        for row, cube in zip(some, cube_turns, strict=True):
-            grips = box_grips(cube)
-            rows += [
-                (row, grip)
-                for grip in grips
-                if between(grip, gives.turns[row]) < APART
-                and self._comes_from_base(grip)
-                and self._other_faces(grip, gives.turns[row])
-            ]
+        taker = self._taker
+        grip, taken = next(self._grips(taker, depth, *DEPTHS))
+        start = taker.opened(taker.qpos(self._scene), grip.share)
+        rows = [
+            (row, turn)
+            for row, cube in enumerate(cubes)
+            for turn in box_grips(cube[:3, :3])
+            if between(turn, gives.turns[row]) < APART
+            and self._comes_from_base(turn)
+            and (min(depth, taken) >= OWN_HALF or _other_faces(turn, gives.turns[row]))
+        ]
         if not rows:
             return
         chosen = np.linspace(0, len(rows) - 1, min(TAKES, len(rows))).astype(int)
-        rows = [rows[i] for i in chosen]
-        numbers = np.array([row for row, _ in rows])
-        turns = np.array([grip for _, grip in rows])
-        places = middle[gives.which[numbers]] + offsets(turns, self._before)
-        takes = taker.reach(places, turns, taker.motion.middle(share), start[None])
-        cubes = dict(zip(some.tolist(), cube_turns, strict=True))
+        numbers = np.array([rows[i][0] for i in chosen])
+        turns = np.array([rows[i][1] for i in chosen])
+        takes = taker.reach(cubes[numbers, :3, 3], turns, grip.pose, start[None])
         for i, which in enumerate(takes.which):
             row = int(numbers[which])
             apart = float(between(takes.turns[i], gives.turns[row]))
             cost = (
-                float(self._giver.way(gives.qpos[row], pick))
+                float(self._giver.way(gives.qpos[row], now))
                 + 0.5 * float(taker.way(takes.qpos[i], start))
                 + 1.5 * (1 + apart)
                 + ALIGNED * float(takes.off[i])
             )
             yield _Exchange(
-                pick,
                 gives.qpos[row],
                 gives.turns[row],
                 takes.qpos[i],
-                cubes[row].T @ takes.turns[i],
-                middle[gives.which[row]],
+                grip,
+                takes.turns[i],
+                cubes[row, :3, 3],
                 cost,
             )
-
-    def _other_faces(self, one: Floats, other: Floats) -> bool:
-        """Return whether two hands hold the cube by different faces, if they have to."""
-        return not self._crosswise or bool(abs(one[:, 1] @ other[:, 1]) < CROSSWISE)
 
     def _comes_from_base(self, grip: Floats) -> bool:
         """Return whether a gripper that is turned so does not point back to the taker's base."""
@@ -252,24 +308,29 @@ class _Search:
         way[2] = 0.0
         return bool(grip[:, 2] @ way > -0.3 * np.linalg.norm(way))
 
-    def _ends(self, point: Floats, starts: Floats) -> HandPostures:
-        """Return postures in which the taker has a point of its TCP link at the goal."""
+    def _ends(self, held: Floats, starts: Floats) -> HandPostures:
+        """Return postures in which the taker brings to the goal what it holds.
+
+        Args:
+            held: Its pose in the TCP link's frame, (4, 4) (m).
+            starts: See `Hand.reach`.
+        """
         goal = self._scene.body(GOAL)[0]
         towards = heading(self._taker.base[:3, 3], goal)
         turns = _gripper_turns(towards, LEANS)
+        frame = self._taker.pointing(held[:3, 3])
         return self._taker.reach(
-            np.tile(goal, (len(turns), 1)), turns, point, starts, scatter=True, loose=True
+            np.tile(goal, (len(turns), 1)), turns, frame, starts, scatter=True, loose=True
         )
 
-    def _is_free(self, meeting: _Exchange) -> bool:
+    def _is_free(self, now: Floats, pick: _Pick, meeting: _Exchange) -> bool:
         """Return whether no robot is inside itself, the other or the table where they meet."""
         giver, taker = self._giver, self._taker
-        held = giver.motion.share(self._edge)
-        give, pick = giver.opened(meeting.give, held), giver.opened(meeting.pick, held)
-        waiting = taker.opened(taker.qpos(self._scene), self._shares[1])
+        give, lifted = (giver.opened(row, pick.grip.held) for row in (meeting.give, now))
+        waiting = taker.opened(taker.qpos(self._scene), meeting.grip.share)
         return (
             self._clear(self._both(give, meeting.take))
-            and all(self._clear(self._both(row, waiting)) for row in _between(pick, give))
+            and all(self._clear(self._both(row, waiting)) for row in _between(lifted, give))
             and all(self._clear(self._both(give, row)) for row in _between(waiting, meeting.take))
         )
 
@@ -291,29 +352,36 @@ class _Search:
 
     # -- the script --------------------------------------------------------------------------
 
-    def _script(self, meeting: _Exchange) -> Script:
+    def picking(self, pick: _Pick) -> tuple[Waypoint, ...]:
+        """Return the giver's waypoints until it has lifted the cube."""
         cube_held = partial(Scene.grasps, robot=GIVER, body=CUBE)
-        cube_taken = partial(Scene.grasps, robot=TAKER, body=CUBE)
-        length = self._fit.length
-        # In proportion to its weight: a light cube that is pressed harder slips out.
-        force = max(FORCE * self._fit.scale**3, LEAST_FORCE)
-        give_share, take_share = self._shares
-        give_near, take_near = (
-            NEAR * self._edge / hand.length for hand in (self._giver, self._taker)
+        share, force = pick.grip.share, self._force()
+        back = partial(self._off, pick)
+        length = self._fit.length(BACK)
+        return (
+            Waypoint("above", joints=partial(back, by=length), share=share, near=0.08),
+            Waypoint(
+                "around", joints=partial(back, by=0.0), share=share, near=self._near(self._giver)
+            ),
+            Waypoint("grasp", squeeze=self._closing(self._giver), until=cube_held, most=150),
+            Waypoint("hold", squeeze=force, steps=4, until=cube_held, most=20),
+            Waypoint(
+                "lift", joints=self._lift, squeeze=force, near=0.08, until=cube_held, most=200
+            ),
         )
-        picked = self._giver.turns(meeting.pick[None])[0]
-        back = partial(self._off, self._giver, meeting.pick, picked, give_share)
+
+    def _script(self, pick: _Pick, meeting: _Exchange) -> Script:
+        cube_taken = partial(Scene.grasps, robot=TAKER, body=CUBE)
+        give_share, take_share = pick.grip.share, meeting.grip.share
+        force = self._force()
         return {
             GIVER: (
+                *self.picking(pick),
                 Waypoint(
-                    "above", joints=partial(back, by=length(BACK)), share=give_share, near=0.08
-                ),
-                Waypoint("around", joints=partial(back, by=0.0), share=give_share, near=give_near),
-                Waypoint("grasp", squeeze=self._closing(self._giver), until=cube_held, most=150),
-                Waypoint("hold", squeeze=force, steps=4, until=cube_held, most=20),
-                Waypoint("lift", joints=self._lift, squeeze=force, near=0.08),
-                Waypoint(
-                    "present", joints=partial(self._give, meeting), squeeze=force, near=give_near
+                    "present",
+                    joints=partial(self._give, meeting),
+                    squeeze=force,
+                    near=self._near(self._giver),
                 ),
                 Waypoint("release", share=give_share, steps=3, after=("right.take",)),
                 Waypoint("retreat", joints=self._retreat, share=give_share, near=0.1),
@@ -326,7 +394,7 @@ class _Search:
                     "around",
                     joints=partial(self._take, meeting),
                     share=take_share,
-                    near=take_near,
+                    near=self._near(self._taker),
                     after=("left.present",),
                 ),
                 Waypoint("take", squeeze=self._closing(self._taker), until=cube_taken, most=150),
@@ -342,68 +410,77 @@ class _Search:
             ),
         }
 
+    def _force(self) -> float:
+        """Return the force with which the cube is held (N).
+
+        It is in proportion to its weight: a light cube that is pressed harder slips out.
+        """
+        return max(FORCE * self._fit.scale**3, LEAST_FORCE)
+
+    def _near(self, hand: Hand) -> float:
+        """Return how near a hand has to come to its place at the cube (rad)."""
+        return NEAR * self._edge / hand.length
+
     def _closing(self, hand: Hand) -> float:
         """Return the force with which a hand closes until it feels the cube (N)."""
         return max(CLOSING, hand.motion.force(STEP, hand.motion.share(self._edge)))
 
-    def _near(
-        self, hand: Hand, place: Floats, turn: Floats, point: Floats, start: Floats
+    def _postures(
+        self, hand: Hand, place: Floats, turn: Floats, frame: Floats, start: Floats
     ) -> Sequence[Floats]:
-        """Return the arm's posture near a start that brings a point to a place; none, if none."""
-        found = hand.reach(place[None], turn[None], point, start[None], scatter=False, loose=True)
+        """Return the arm's posture near a start that brings a frame to a pose; none, if none."""
+        found = hand.reach(place[None], turn[None], frame, start[None], scatter=False, loose=True)
         return list(hand.joints(found.qpos))
 
-    def _off(
-        self, hand: Hand, posture: Floats, turn: Floats, share: float, scene: Scene, by: float
-    ) -> Sequence[Floats]:
-        """Return the posture ``by`` (m) before that in which a hand holds the cube as it lies."""
-        place = scene.body(CUBE)[0] + offsets(turn[None], self._before + by)[0]
-        return self._near(hand, place, turn, hand.motion.middle(share), posture)
+    def _off(self, pick: _Pick, scene: Scene, by: float) -> Sequence[Floats]:
+        """Return the posture ``by`` (m) before that in which it holds the cube as it lies."""
+        place = scene.body(CUBE)[0] + offsets(pick.turn[None], by)[0]
+        return self._postures(self._giver, place, pick.turn, pick.grip.pose, pick.qpos)
 
     def _lift(self, scene: Scene) -> Sequence[Floats]:
-        hand, held = self._giver, self._giver.held(scene, CUBE)
-        now = hand.qpos(scene)
+        hand, now = self._giver, self._giver.qpos(scene)
+        held = hand.pointing(hand.held(scene, CUBE)[:3, 3])
         place = scene.body(CUBE)[0] + (0.0, 0.0, self._fit.length(LIFT))
-        return self._near(hand, place, hand.turns(now[None])[0], held, now)
+        return self._postures(hand, place, hand.turns(now[None])[0], held, now)
 
     def _give(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
-        held = self._giver.held(scene, CUBE)
-        return self._near(self._giver, meeting.place, meeting.turn, held, meeting.give)
+        held = self._giver.pointing(self._giver.held(scene, CUBE)[:3, 3])
+        return self._postures(self._giver, meeting.place, meeting.turn, held, meeting.give)
 
     def _retreat(self, scene: Scene) -> Sequence[Floats]:
         hand = self._giver
         now = hand.qpos(scene)
         turn, link = hand.turns(now[None])[0], hand.link(now[None])[0]
         place = link[:3, 3] + offsets(turn[None], self._fit.length(RETREAT))[0]
-        return self._near(hand, place, turn, np.zeros(3), now)
+        return self._postures(hand, place, turn, hand.pointing(np.zeros(3)), now)
 
     def _expect(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
-        turn = self._taker.turns(meeting.take[None])[0]
-        by = self._before + self._fit.length(BACK)
-        place = meeting.place + offsets(turn[None], by)[0]
-        middle = self._taker.motion.middle(self._shares[1])
-        return self._near(self._taker, place, turn, middle, meeting.take)
+        place = meeting.place + offsets(meeting.turned[None], self._fit.length(BACK))[0]
+        return self._postures(self._taker, place, meeting.turned, meeting.grip.pose, meeting.take)
 
     def _take(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
         """Return postures that hold the cube as the giver holds it by now, about as planned."""
         position, quaternion = scene.body(CUBE)
         hand, giver = self._taker, self._giver
-        planned = hand.turns(meeting.take[None])[0]
-        grips = box_grips(rotation_of(quaternion), around=24)
+        turns = box_grips(rotation_of(quaternion), around=24)
         given = giver.turns(giver.qpos(scene)[None])[0]
-        alike = between(grips, planned) > SIMILAR
-        grips = grips[alike & (between(grips, given) < APART + 0.2)]
-        if not len(grips):
+        alike = between(turns, meeting.turned) > SIMILAR
+        turns = turns[alike & (between(turns, given) < APART + 0.2)]
+        if not len(turns):
             return ()
-        places = position + offsets(grips, self._before)
-        middle = hand.motion.middle(self._shares[1])
-        found = hand.reach(places, grips, middle, meeting.take[None], scatter=False)
+        places = np.tile(position, (len(turns), 1))
+        found = hand.reach(places, turns, meeting.grip.pose, meeting.take[None], scatter=False)
         return list(hand.joints(found.qpos))
 
     def _carry(self, scene: Scene) -> Sequence[Floats]:
         hand = self._taker
         now = hand.qpos(scene)
         return list(hand.joints(self._ends(hand.held(scene, CUBE), now[None]).qpos))
+
+
+def _other_faces(one: Floats, other: Floats) -> bool:
+    """Return whether two hands hold the cube by different faces."""
+    return bool(abs(one[:, 1] @ other[:, 1]) < CROSSWISE)
 
 
 def _between(start: Floats, end: Floats) -> Floats:

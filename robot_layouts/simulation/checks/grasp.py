@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,10 +10,9 @@ import numpy as np
 from layouts import single
 from layouts.validation.collisions import Postures, fixed, nearest
 from layouts.validation.collisions import stand as stand_hulls
-from robot_layouts.kinematics.rotations import Floats, inverse, pose_matrix, quaternion_of, rotate
-from robot_layouts.simulation.checks.trial import NAME, RobotAlone
-from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
-from robot_layouts.simulation.scene.shapes import Box
+from robot_layouts.kinematics.rotations import Floats, pose_matrix, quaternion_of
+from robot_layouts.simulation.checks.closing import Closing
+from robot_layouts.simulation.checks.trial import NAME
 from robots import RobotDescriptor
 from robots.action_split import is_gripper
 from robots.bodies.hulls import convex_hull, load_model
@@ -22,20 +20,14 @@ from robots.gripper_motion import gripper_motion
 from robots.parts import Fingers
 from robots.urdf.tcp import find_tcp
 
-CUBE = "cube"  # its name in the world
 OFF = 5e-3  # m; a TCP may be so far from where the fingers meet
 SIDES, SHARE = (0.02, 0.03), 0.6  # m; and of how far the fingers part: the cube's side
 SLIPS = 0.01  # m; a cube that moves farther in the hand is not held
 
 _SHARES = 33  # postures from one end of the gripper to the other
 _POINT = 1e-4  # m; half the size of the body that stands for a point
-_CLOSING, _HOLDING, _SHAKING = 200, 20, 40  # steps
-_CLOSE, _HOLD = 30.0, 3.0  # N with which fingers close until they feel the cube, and hold it
 _AJAR = 1.4  # of the cube's side: how far the fingers are apart before they close
 _DEEP = 0.1  # of the cube's side: how far it lies from the TCP towards the palm
-_STEP = 2e-4  # m by which they close in a step at least
-_SHAKE, _PERIOD = 0.1, 10  # rad or m to both sides, and steps; 0.5 m away that is some 8 m/s²
-_WEIGHTLESS = replace(SAPIEN_DEFAULTS, gravity=(0.0, 0.0, 0.0))
 
 
 class GraspTrial(NamedTuple):
@@ -121,20 +113,19 @@ class _Gripper:
     """A gripper of a robot alone, at places between its two ends, of which the first is closed."""
 
     def __init__(self, robot: RobotDescriptor, arm: str, fingers: Fingers) -> None:
-        layout = single({NAME: robot}).in_control_mode("pd_joint_pos")
-        placement, self._part = layout[NAME], layout.arm(arm).robot
-        self._layout, self._arm, self._fingers = layout, arm, fingers
-        model = load_model(placement.robot)
-        tree = model.kinematics
-        self._joints = placement.robot.joints
-        self._motion = gripper_motion(self._part)
-        self._gripper = [self._joints.index(joint) for joint in self._motion.joints]
+        layout = single({NAME: robot})
+        placement, part = layout[NAME], layout.arm(arm).robot
+        self._arm, self._fingers = arm, fingers
+        self._closing = Closing(layout, arm)
+        model = load_model(robot)
+        tree, motion = model.kinematics, gripper_motion(part)
+        gripper = [robot.joints.index(joint) for joint in motion.joints]
         rows = np.tile(np.array(placement.start_qpos), (_SHARES, 1))
-        rows[:, self._gripper] = [self._motion.positions(at) for at in np.linspace(0, 1, _SHARES)]
+        rows[:, gripper] = [motion.positions(at) for at in np.linspace(0, 1, _SHARES)]
         self._hulls = stand_hulls(NAME, placement.base_pose, model, rows)
         base = placement.base_pose
         poses = pose_matrix(base.position, base.quaternion) @ tree.forward(rows)
-        self._tcps = find_tcp(self._part, tree).places(poses)
+        self._tcps = find_tcp(part, tree).places(poses)
         bodies = [tree.bodies[tree.link(link)] for link in fingers.links]
         self._pairs = [
             [(i, 0) for i, hull in enumerate(model.hulls) if tree.bodies[hull.link] == body]
@@ -161,8 +152,10 @@ class _Gripper:
             fitting = [at for at in between if gaps[at] >= side][-1]
             ajar = [at for at in between if gaps[at] >= _AJAR * side][-1:] or [wide]
             open_, cube = self._rows[ajar[0]], self._cube(ends[fitting], fitting, side)
-            closed, held, slipped = self._close(open_, cube, side)
-            seen = seen._replace(side=side, closed=closed, held=held, slipped=slipped)
+            closed = self._closing.close(open_, cube, side)
+            seen = seen._replace(
+                side=side, closed=closed.grasped, held=closed.held, slipped=closed.slipped
+            )
             if seen.grasps:
                 break
         return seen
@@ -206,49 +199,3 @@ class _Gripper:
             hulls.low[at : at + 1],
             hulls.high[at : at + 1],
         )
-
-    def _close(
-        self, open_: Floats, cube: tuple[Floats, Floats], side: float
-    ) -> tuple[bool, bool, float]:
-        """Close on a cube; return whether it is grasped, stays so, and how far it slips (m)."""
-        alone = RobotAlone(
-            self._layout, (CUBE, Box((side / 2, side / 2, side / 2))), physics=_WEIGHTLESS
-        )
-        world = alone.simulation.worlds[0]
-        world.stand(NAME, open_)
-        world.set_pose(CUBE, *cube)
-        target = open_.copy()
-        for _ in range(_CLOSING):
-            target[self._gripper] = self._pressed(alone, side)
-            alone.step(alone.numbers_for(target))
-        closed, place = self._grasps(alone), self._in_hand(alone)
-        slipped, grasped = 0.0, list[bool]()
-        arm = [joint for joint in self._part.joints if joint in self._part.arm_joints][:1]
-        for step in range(_HOLDING + _SHAKING):
-            target[self._gripper] = self._pressed(alone, side)
-            shaken = target.copy()
-            for joint in arm:
-                turns = max(step - _HOLDING, 0) / _PERIOD
-                shaken[self._joints.index(joint)] += _SHAKE * np.sin(2 * np.pi * turns)
-            alone.step(alone.numbers_for(shaken))
-            grasped.append(self._grasps(alone))
-            slipped = max(slipped, float(np.linalg.norm(self._in_hand(alone) - place)))
-        held = closed and any(grasped[-_PERIOD:])
-        return closed, held, slipped if np.isfinite(slipped) else np.inf
-
-    def _pressed(self, alone: RobotAlone, side: float) -> Floats:
-        """Return where the gripper's joints are to go: to close, or to hold what they grasp."""
-        now = alone.simulation.read().qpos(NAME)[0].astype(float)[self._gripper]
-        share = self._motion.share_at(now)
-        closing = max(_CLOSE, self._motion.force(_STEP, self._motion.share(side)))
-        force = _HOLD if self._grasps(alone) else closing
-        return self._motion.positions(share - self._motion.pressing(force, share))
-
-    def _grasps(self, alone: RobotAlone) -> bool:
-        return bool(alone.simulation.read().is_grasping(self._arm, CUBE)[0])
-
-    def _in_hand(self, alone: RobotAlone) -> Floats:
-        """Return where the cube is in the frame of the first finger, (3,) (m)."""
-        state = alone.simulation.read()
-        finger = state.link_pose(self._arm, self._fingers.links[0])[0].astype(float)
-        return rotate(inverse(finger[3:]), state.pose(CUBE)[0, :3].astype(float) - finger[:3])
