@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 from math import pi
 
 import numpy as np
@@ -22,6 +23,7 @@ from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
 from robot_layouts.simulation.checks.closing import Closing
 from robot_layouts.simulation.checks.trial import NAME
 from robots import RobotDescriptor
+from robots.action_split import is_gripper
 from robots.gripper_motion import gripper_motion, link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
@@ -33,7 +35,9 @@ TURN_WORTH = 0.02  # m that a turn by 1 rad is worth to an arm of fewer joints
 FIRST_ITERATIONS, ITERATIONS = 12, 30
 NEAR, NEAR_TURN = 0.1, 0.8  # m and rad from a goal after the first of them
 RANDOM_STARTS = 3
+QUICK = 2.0  # times that quick drives nearly settle in a control step
 WIDER = (1.45, 2.0)  # than a cube a gripper is open before it closes
+ASIDE = (0.0, 0.25, -0.25, 0.5, -0.5)  # of its side: how far from the middle of the pads it may be
 SLIPS = 0.1  # of a cube's side that it may move in a hand that is shaken
 
 
@@ -86,6 +90,7 @@ class Hand:
         owner: The robot that it belongs to.
         motion: How its gripper moves.
         length: How far it reaches (m).
+        quick: Whether its fingers are where they are driven to after each control step.
         columns: Indices of the arm's joints among the robot's.
         base: Pose of the robot's base in the world, (4, 4) (m).
     """
@@ -111,6 +116,12 @@ class Hand:
         self._tcp = find_tcp(own, self._tree)
         few = len(self.columns) < FULL
         self._turn, self._worth = (ROUGH_TURN, TURN_WORTH) if few else (TURN, 1.0)
+        seconds = 1 / task.scenario.control_frequency
+        self.quick = all(
+            np.min(group.stiffness) * seconds > QUICK * np.max(group.damping)
+            for name, group in own.action_split.groups.items()
+            if is_gripper(name) and group.size
+        )
         self._random = scattered(self._tree.limits[self.columns], RANDOM_STARTS)
 
     def grip(self, side: float, depth: float) -> Grip | None:
@@ -129,6 +140,12 @@ class Hand:
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""
         return scene.qpos(self.owner)
+
+    def like(self, scene: Scene, posture: Floats) -> Floats:
+        """Return a posture of the arm with all other joints where they are now, (dof,) (rad, m)."""
+        qpos = self.qpos(scene)
+        qpos[self.columns] = posture[self.columns]
+        return qpos
 
     def joints(self, qpos: Floats) -> Floats:
         """Return the arm's joints among all of its robot, (…, arm joints) (rad)."""
@@ -223,20 +240,23 @@ class Hand:
 def _grip(robot: RobotDescriptor, limb: str, side: float, depth: float) -> Grip | None:
     """See `Hand.grip`; the limb is what its name adds to the robot's."""
     layout = single({NAME: robot})
-    own, closing = layout.arm(NAME + limb).robot, Closing(layout, NAME + limb)
+    own, closing = layout.arm(NAME + limb).robot, Closing(layout, NAME + limb, side)
     motion, tree = gripper_motion(own), link_tree(robot)
     gripper = [robot.joints.index(joint) for joint in motion.joints]
     base, tcp = layout[NAME].base_pose, find_tcp(own, tree).turned
-    for wide in WIDER:
+    for wide, aside in product(WIDER, ASIDE):
         share, qpos = motion.share(wide * side), np.array(layout[NAME].start_qpos, float)
         qpos[gripper] = motion.positions(share)
         pose = np.eye(4)
         pose[:3, :3] = motion.turn
-        pose[:3, 3] = motion.middle(share) + depth * side * motion.turn[:, 2]
+        pose[:3, 3] = motion.middle(share) + motion.turn @ (0.0, aside * side, depth * side)
         link = pose_matrix(base.position, base.quaternion) @ tree.forward(qpos[None])[0, tcp]
         cube = link @ pose
-        closed = closing.close(qpos, (cube[:3, 3], quaternion_of(cube[:3, :3])), side)
-        if closed.held and max(closed.pushed, closed.slipped) < SLIPS * side:
+        place = cube[:3, 3], quaternion_of(cube[:3, :3])
+        if not closing.has_room(qpos, place):
+            continue
+        closed = closing.close(qpos, place)
+        if closed.held and closed.slipped < SLIPS * side:
             return Grip(pose, share, closed.share)
     return None
 

@@ -31,7 +31,7 @@ _HEIGHT = 0.35  # of the shorter reach: how high above the ground places are loo
 _OFTEN = 3  # samples in a cell and its neighbours that show it to be well within reach
 _ROOM = 0.04  # m that a declaration for a Panda needs about its origin, in reach of all arms
 _HELD = 0.75  # of a gripper's opening that a body to be held may take
-_SPLAYED = 0.3  # rad; between jaws that are turned more a body is held by its edges, and slips out
+_SPLAYED = 0.28  # rad; between jaws that are turned more a body is held by its edges, and slips out
 _LARGEST, _SMALLEST = 3.0, 0.05
 
 

@@ -7,6 +7,7 @@ import tasks
 from layouts import face_to_face
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.hands import Hand, between, box_grips
+from robot_layouts.experts.rehearsal import Rehearsal
 from robot_layouts.kinematics.rotations import rotation_about
 from robots import TaskError
 from tasks.episode import play
@@ -23,7 +24,7 @@ def test_two_pandas_hand_over():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("pair", [("so100", "so100"), ("panda", "so100")])
+@pytest.mark.parametrize("pair", [("so100", "so100"), ("so101", "so101"), ("panda", "so100")])
 def test_small_and_mixed_pairs_hand_over(pair: tuple[str, str]):
     env = tasks.make(TASK, layout=face_to_face(dict(zip(("left", "right"), pair, strict=True))))
     assert any(play(env, seed, expert(env, seed)).solved for seed in range(3))
@@ -56,7 +57,28 @@ def test_postures_bring_the_point_between_the_fingers_where_it_is_to_be(robot: s
     place = link[:3, :3] @ point + link[:3, 3]
     away = here.copy()
     away[hand.columns] += 0.1
-    found = hand.reach(place[None], hand.turns(here[None]), point, away[None])
+    found = hand.reach(place[None], hand.turns(here[None]), hand.pointing(point), away[None])
     assert len(found) == 1
     reached = hand.link(found.qpos)[0]
     assert np.linalg.norm(reached[:3, :3] @ point + reached[:3, 3] - place) < 2e-3
+
+
+@pytest.mark.parametrize("robot", ["panda", "so101"])
+def test_a_hand_shows_in_physics_how_it_holds_a_cube(robot: str):
+    env = tasks.make(TASK, layout=face_to_face({"left": robot, "right": robot}))
+    hand = Hand(env, "left")
+    grip = hand.grip(0.02, 0.2)
+    assert grip is not None
+    assert 0 < grip.held < grip.share
+    ahead = hand.motion.turn.T @ (grip.pose[:3, 3] - hand.motion.middle(grip.share))
+    assert ahead[2] == pytest.approx(0.2 * 0.02)
+    assert hand.grip(3 * hand.motion.widest, 0.2) is None
+
+
+def test_a_posture_of_an_arm_leaves_all_other_joints_where_they_are():
+    env = tasks.make(TASK)
+    hand, scene = Hand(env, "left"), Rehearsal(env).begin(0)
+    posture = np.arange(9.0)
+    like = hand.like(scene, posture)
+    assert np.array_equal(like[:7], posture[:7])
+    assert np.array_equal(like[7:], scene.qpos("left")[7:])

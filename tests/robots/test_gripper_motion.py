@@ -66,3 +66,12 @@ def test_a_gripper_that_stays_where_it_is_has_no_two_ends():
 def test_without_fingers_there_is_none():
     with pytest.raises(DescriptorError, match="panda_stick has no fingers"):
         gripper_motion(load("panda_stick"))
+
+
+def test_jaws_that_swing_are_turned_against_each_other_as_they_open():
+    sliding, swinging = gripper_motion(load("panda")), gripper_motion(load("so101"))
+    assert sliding.angles.max() < 1e-6
+    assert sliding.widest_within(0.1) == sliding.widest
+    assert swinging.angles[0] < 1e-6
+    assert swinging.angles[-1] > 1.5
+    assert 0 < swinging.widest_within(0.1) < swinging.widest_within(0.3) < swinging.widest

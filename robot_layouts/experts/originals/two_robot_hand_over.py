@@ -34,6 +34,7 @@ GIVER, TAKER, CUBE, GOAL = "left", "right", "cube", "goal_site"
 DEPTHS = (0.2, -0.1, -0.35)
 OWN_HALF = 0.1  # the least depth at which each holds its own half
 NEAR = 0.3  # how far from its place a gripper may be when it closes or waits
+BEFORE = 3  # times as far it may be from where it begins to come to the cube
 
 # Lengths for a Panda (m), as the task fits others.
 BACK, LIFT, RETREAT = 0.07, 0.04, 0.1
@@ -45,6 +46,7 @@ UPWARD = -0.2  # cosine: a gripper that picks points down more than that
 STRIDE = 0.4  # rad between postures on a way that are checked
 CLOSING, STEP = 60.0, 4e-4  # N with which fingers close on the cube, at least; m per step, at least
 FORCE, LEAST_FORCE = 15.0, 1.5  # N with which they hold a cube for Pandas; any cube, at least
+YIELD = 1e-4  # m that quick fingers are driven into what they hold, at least
 CROSSWISE = 0.5  # cosine between the ways in which two hands open that hold different faces
 ALIGNED = 4.0  # rad of way that a hand is worth which is turned as the cube is, by 1 rad
 SIMILAR = 0.5  # cosine between the approach that was planned and that which is taken
@@ -93,7 +95,7 @@ def _scripts(task: TaskEnv, seed: int, copy: Rehearsal) -> Iterator[Script | Att
 
 
 @dataclass(frozen=True, eq=False)
-class _Pick:
+class _Picking:
     """How the giver holds the cube as it lies.
 
     Attributes:
@@ -150,7 +152,7 @@ class _Search:
         )
         self._usual = self._parts({})
 
-    def picks(self) -> Iterator[_Pick]:
+    def picks(self) -> Iterator[_Picking]:
         """Yield ways to hold the cube as it lies, the most promising first.
 
         Raises:
@@ -161,11 +163,11 @@ class _Search:
             postures = self._picks(grip)
             for row in self._free_picks(postures):
                 found = True
-                yield _Pick(postures.qpos[row], postures.turns[row], grip, depth)
+                yield _Picking(postures.qpos[row], postures.turns[row], grip, depth)
         if not found:
             raise TaskError(f"{GIVER!r} cannot reach the cube with its gripper")
 
-    def scripts(self, pick: _Pick, lifted: Scene) -> list[Script]:
+    def scripts(self, pick: _Picking, lifted: Scene) -> list[Script]:
         """Return the scripts to try, the most promising first.
 
         Args:
@@ -241,7 +243,7 @@ class _Search:
         found = list(islice(free, PICKS))
         return found or list(range(min(PICKS, len(picks))))
 
-    def _meetings(self, pick: _Pick, now: Floats, held: Floats) -> Iterator[_Exchange]:
+    def _meetings(self, pick: _Picking, now: Floats, held: Floats) -> Iterator[_Exchange]:
         """Yield where the giver may give the cube, and the taker take it.
 
         Args:
@@ -323,7 +325,7 @@ class _Search:
             np.tile(goal, (len(turns), 1)), turns, frame, starts, scatter=True, loose=True
         )
 
-    def _is_free(self, now: Floats, pick: _Pick, meeting: _Exchange) -> bool:
+    def _is_free(self, now: Floats, pick: _Picking, meeting: _Exchange) -> bool:
         """Return whether no robot is inside itself, the other or the table where they meet."""
         giver, taker = self._giver, self._taker
         give, lifted = (giver.opened(row, pick.grip.held) for row in (meeting.give, now))
@@ -352,17 +354,15 @@ class _Search:
 
     # -- the script --------------------------------------------------------------------------
 
-    def picking(self, pick: _Pick) -> tuple[Waypoint, ...]:
+    def picking(self, pick: _Picking) -> tuple[Waypoint, ...]:
         """Return the giver's waypoints until it has lifted the cube."""
         cube_held = partial(Scene.grasps, robot=GIVER, body=CUBE)
-        share, force = pick.grip.share, self._force()
-        back = partial(self._off, pick)
+        share, force = pick.grip.share, self._force(self._giver)
+        back, near = partial(self._off, pick), self._near(self._giver)
         length = self._fit.length(BACK)
         return (
-            Waypoint("above", joints=partial(back, by=length), share=share, near=0.08),
-            Waypoint(
-                "around", joints=partial(back, by=0.0), share=share, near=self._near(self._giver)
-            ),
+            Waypoint("above", joints=partial(back, by=length), share=share, near=BEFORE * near),
+            Waypoint("around", joints=partial(back, by=0.0), share=share, near=near),
             Waypoint("grasp", squeeze=self._closing(self._giver), until=cube_held, most=150),
             Waypoint("hold", squeeze=force, steps=4, until=cube_held, most=20),
             Waypoint(
@@ -370,17 +370,16 @@ class _Search:
             ),
         )
 
-    def _script(self, pick: _Pick, meeting: _Exchange) -> Script:
+    def _script(self, pick: _Picking, meeting: _Exchange) -> Script:
         cube_taken = partial(Scene.grasps, robot=TAKER, body=CUBE)
         give_share, take_share = pick.grip.share, meeting.grip.share
-        force = self._force()
         return {
             GIVER: (
                 *self.picking(pick),
                 Waypoint(
                     "present",
                     joints=partial(self._give, meeting),
-                    squeeze=force,
+                    squeeze=self._force(self._giver),
                     near=self._near(self._giver),
                 ),
                 Waypoint("release", share=give_share, steps=3, after=("right.take",)),
@@ -400,22 +399,25 @@ class _Search:
                 Waypoint("take", squeeze=self._closing(self._taker), until=cube_taken, most=150),
                 Waypoint(
                     "hold",
-                    squeeze=force,
+                    squeeze=self._force(self._taker),
                     steps=4,
                     after=("left.release",),
                     until=cube_taken,
                     most=20,
                 ),
-                Waypoint("carry", joints=self._carry, squeeze=force, near=0.1),
+                Waypoint("carry", joints=self._carry, squeeze=self._force(self._taker), near=0.1),
             ),
         }
 
-    def _force(self) -> float:
-        """Return the force with which the cube is held (N).
+    def _force(self, hand: Hand) -> float:
+        """Return the force with which a hand holds the cube (N).
 
-        It is in proportion to its weight: a light cube that is pressed harder slips out.
+        It is in proportion to its weight: a light cube that is pressed harder slips out. Of what
+        quick drives press with, little is left once they have settled.
         """
-        return max(FORCE * self._fit.scale**3, LEAST_FORCE)
+        force = max(FORCE * self._fit.scale**3, LEAST_FORCE)
+        share = hand.motion.share(self._edge)
+        return max(force, hand.motion.force(YIELD, share)) if hand.quick else force
 
     def _near(self, hand: Hand) -> float:
         """Return how near a hand has to come to its place at the cube (rad)."""
@@ -432,10 +434,11 @@ class _Search:
         found = hand.reach(place[None], turn[None], frame, start[None], scatter=False, loose=True)
         return list(hand.joints(found.qpos))
 
-    def _off(self, pick: _Pick, scene: Scene, by: float) -> Sequence[Floats]:
+    def _off(self, pick: _Picking, scene: Scene, by: float) -> Sequence[Floats]:
         """Return the posture ``by`` (m) before that in which it holds the cube as it lies."""
         place = scene.body(CUBE)[0] + offsets(pick.turn[None], by)[0]
-        return self._postures(self._giver, place, pick.turn, pick.grip.pose, pick.qpos)
+        start = self._giver.like(scene, pick.qpos)
+        return self._postures(self._giver, place, pick.turn, pick.grip.pose, start)
 
     def _lift(self, scene: Scene) -> Sequence[Floats]:
         hand, now = self._giver, self._giver.qpos(scene)
@@ -444,8 +447,9 @@ class _Search:
         return self._postures(hand, place, hand.turns(now[None])[0], held, now)
 
     def _give(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
-        held = self._giver.pointing(self._giver.held(scene, CUBE)[:3, 3])
-        return self._postures(self._giver, meeting.place, meeting.turn, held, meeting.give)
+        hand = self._giver
+        held, start = hand.pointing(hand.held(scene, CUBE)[:3, 3]), hand.like(scene, meeting.give)
+        return self._postures(hand, meeting.place, meeting.turn, held, start)
 
     def _retreat(self, scene: Scene) -> Sequence[Floats]:
         hand = self._giver
@@ -456,7 +460,8 @@ class _Search:
 
     def _expect(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
         place = meeting.place + offsets(meeting.turned[None], self._fit.length(BACK))[0]
-        return self._postures(self._taker, place, meeting.turned, meeting.grip.pose, meeting.take)
+        start = self._taker.like(scene, meeting.take)
+        return self._postures(self._taker, place, meeting.turned, meeting.grip.pose, start)
 
     def _take(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
         """Return postures that hold the cube as the giver holds it by now, about as planned."""
@@ -469,7 +474,8 @@ class _Search:
         if not len(turns):
             return ()
         places = np.tile(position, (len(turns), 1))
-        found = hand.reach(places, turns, meeting.grip.pose, meeting.take[None], scatter=False)
+        start = hand.like(scene, meeting.take)[None]
+        found = hand.reach(places, turns, meeting.grip.pose, start, scatter=False)
         return list(hand.joints(found.qpos))
 
     def _carry(self, scene: Scene) -> Sequence[Floats]:

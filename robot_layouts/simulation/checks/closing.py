@@ -9,6 +9,7 @@ import numpy as np
 
 from layouts import Layout
 from robot_layouts.kinematics.rotations import Floats, inverse, rotate
+from robot_layouts.simulation.checks.overlaps import stand
 from robot_layouts.simulation.checks.trial import NAME, RobotAlone
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
 from robot_layouts.simulation.scene.shapes import Box
@@ -20,6 +21,7 @@ _CLOSING, _HOLDING, _SHAKING = 200, 20, 40  # steps
 _CLOSE, _HOLD = 30.0, 3.0  # N with which fingers close until they feel the cube, and hold it
 _STEP = 2e-4  # m by which they close in a step at least
 _SHAKE, _PERIOD = 0.1, 10  # rad or m to both sides, and steps; 0.5 m away that is some 8 m/s²
+_ROOM = 0.02  # of the cube's side: farther a cube moves in a step that is inside the hand
 _WEIGHTLESS = replace(SAPIEN_DEFAULTS, gravity=(0.0, 0.0, 0.0))
 
 
@@ -27,7 +29,6 @@ class Closed(NamedTuple):
     """What was seen.
 
     Attributes:
-        pushed: How far it moved in the first step (m): much if the open hand has no room for it.
         grasped: Whether the fingers grasped it when they had closed.
         held: Whether they still did when the arm had shaken it.
         slipped: How far it moved in the hand meanwhile (m); infinite if it was thrown away.
@@ -35,7 +36,6 @@ class Closed(NamedTuple):
             `robots.gripper_motion.GripperMotion`.
     """
 
-    pushed: float
     grasped: bool
     held: bool
     slipped: float
@@ -43,81 +43,86 @@ class Closed(NamedTuple):
 
 
 class Closing:
-    """A gripper of a robot alone, that closes on cubes which float between its fingers."""
+    """A gripper of a robot alone, that closes on a cube which floats between its fingers."""
 
-    def __init__(self, layout: Layout, arm: str) -> None:
+    def __init__(self, layout: Layout, arm: str, side: float) -> None:
         """Take the gripper.
 
         Args:
             layout: The robot alone, under the name `NAME`.
             arm: The robot, or the limb, by its name in the layout.
+            side: Of the cube (m).
 
         Raises:
             DescriptorError: If it has no fingers.
-            AssetError: If robot files cannot be found.
+            RobotLayoutsError: If the robot cannot be built.
         """
-        self._layout, self._arm = layout.in_control_mode("pd_joint_pos"), arm
-        self._part = layout.arm(arm).robot
+        layout = layout.in_control_mode("pd_joint_pos")
+        self._arm, self._part, self._side = arm, layout.arm(arm).robot, side
         self._motion = gripper_motion(self._part)
         self._joints = layout[NAME].robot.joints
         self._gripper = [self._joints.index(joint) for joint in self._motion.joints]
+        cube = Box((side / 2, side / 2, side / 2))
+        self._alone = RobotAlone(layout, (CUBE, cube), physics=_WEIGHTLESS)
 
-    def close(self, open_: Floats, place: tuple[Floats, Floats], side: float) -> Closed:
-        """Close on a cube, hold it, and shake it with the arm's first joint.
+    def has_room(self, open_: Floats, place: tuple[Floats, Floats]) -> bool:
+        """Return whether the cube is not inside the open hand; see `close`."""
+        self._begin(open_, place)
+        self._alone.step(self._alone.numbers_for(open_.tolist()))
+        away = self._alone.simulation.read().position(CUBE)[0].astype(float) - place[0]
+        return float(np.linalg.norm(away)) < _ROOM * self._side
+
+    def close(self, open_: Floats, place: tuple[Floats, Floats]) -> Closed:
+        """Close on the cube, hold it, and shake it with the arm's first joint.
 
         Args:
             open_: All joints of the robot at first, (dof,) (rad, m).
             place: Where the cube floats then: its place, (3,) (m), and orientation, wxyz.
-            side: Of the cube (m).
-
-        Raises:
-            RobotLayoutsError: If the robot cannot be built.
         """
-        cube = Box((side / 2, side / 2, side / 2))
-        alone = RobotAlone(self._layout, (CUBE, cube), physics=_WEIGHTLESS)
-        world = alone.simulation.worlds[0]
-        world.stand(NAME, open_)
-        world.set_pose(CUBE, *place)
-        target, pushed = open_.copy(), 0.0
-        for step in range(_CLOSING):
-            target[self._gripper] = self._pressed(alone, side)
+        self._begin(open_, place)
+        alone, target = self._alone, open_.copy()
+        for _ in range(_CLOSING):
+            target[self._gripper] = self._pressed()
             alone.step(alone.numbers_for(target))
-            if step == 0:
-                now = alone.simulation.read().position(CUBE)[0]
-                pushed = float(np.linalg.norm(now.astype(float) - place[0]))
-        grasped, first, share = self._grasps(alone), self._in_hand(alone), self._share(alone)
+        grasped, first, share = self._grasps(), self._in_hand(), self._share()
         slipped, grasps = 0.0, list[bool]()
         arm = [joint for joint in self._part.joints if joint in self._part.arm_joints][:1]
         for step in range(_HOLDING + _SHAKING):
-            target[self._gripper] = self._pressed(alone, side)
+            target[self._gripper] = self._pressed()
             shaken = target.copy()
             for joint in arm:
                 turns = max(step - _HOLDING, 0) / _PERIOD
                 shaken[self._joints.index(joint)] += _SHAKE * np.sin(2 * np.pi * turns)
             alone.step(alone.numbers_for(shaken))
-            grasps.append(self._grasps(alone))
-            way = float(np.linalg.norm(self._in_hand(alone) - first))
+            grasps.append(self._grasps())
+            way = float(np.linalg.norm(self._in_hand() - first))
             slipped = max(slipped, way if np.isfinite(way) else np.inf)
         held = grasped and any(grasps[-_PERIOD:])
-        return Closed(pushed, grasped, held, slipped, share)
+        return Closed(grasped, held, slipped, share)
 
-    def _share(self, alone: RobotAlone) -> float:
-        now = alone.simulation.read().qpos(NAME)[0].astype(float)
+    def _begin(self, open_: Floats, place: tuple[Floats, Floats]) -> None:
+        stand(self._alone.simulation)
+        world = self._alone.simulation.worlds[0]
+        world.stand(NAME, open_)
+        world.set_pose(CUBE, *place)
+
+    def _share(self) -> float:
+        now = self._alone.simulation.read().qpos(NAME)[0].astype(float)
         return self._motion.share_at(now[self._gripper])
 
-    def _pressed(self, alone: RobotAlone, side: float) -> Floats:
+    def _pressed(self) -> Floats:
         """Return where the gripper's joints are to go: to close, or to hold what they grasp."""
-        share = self._share(alone)
-        closing = max(_CLOSE, self._motion.force(_STEP, self._motion.share(side)))
-        force = _HOLD if self._grasps(alone) else closing
+        share = self._share()
+        closing = max(_CLOSE, self._motion.force(_STEP, self._motion.share(self._side)))
+        force = _HOLD if self._grasps() else closing
         return self._motion.positions(share - self._motion.pressing(force, share))
 
-    def _grasps(self, alone: RobotAlone) -> bool:
-        return bool(alone.simulation.read().is_grasping(self._arm, CUBE)[0])
+    def _grasps(self) -> bool:
+        return bool(self._alone.simulation.read().is_grasping(self._arm, CUBE)[0])
 
-    def _in_hand(self, alone: RobotAlone) -> Floats:
+    def _in_hand(self) -> Floats:
         """Return where the cube is in the frame of the first finger, (3,) (m)."""
-        state, fingers = alone.simulation.read(), self._part.fingers
+        state, fingers = self._alone.simulation.read(), self._part.fingers
         assert fingers is not None  # or it had no gripper that moves
         finger = state.link_pose(self._arm, fingers.links[0])[0].astype(float)
         return rotate(inverse(finger[3:]), state.pose(CUBE)[0, :3].astype(float) - finger[:3])

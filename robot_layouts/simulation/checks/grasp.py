@@ -115,8 +115,7 @@ class _Gripper:
     def __init__(self, robot: RobotDescriptor, arm: str, fingers: Fingers) -> None:
         layout = single({NAME: robot})
         placement, part = layout[NAME], layout.arm(arm).robot
-        self._arm, self._fingers = arm, fingers
-        self._closing = Closing(layout, arm)
+        self._layout, self._arm, self._fingers = layout, arm, fingers
         model = load_model(robot)
         tree, motion = model.kinematics, gripper_motion(part)
         gripper = [robot.joints.index(joint) for joint in motion.joints]
@@ -152,7 +151,7 @@ class _Gripper:
             fitting = [at for at in between if gaps[at] >= side][-1]
             ajar = [at for at in between if gaps[at] >= _AJAR * side][-1:] or [wide]
             open_, cube = self._rows[ajar[0]], self._cube(ends[fitting], fitting, side)
-            closed = self._closing.close(open_, cube, side)
+            closed = Closing(self._layout, self._arm, side).close(open_, cube)
             seen = seen._replace(
                 side=side, closed=closed.grasped, held=closed.held, slipped=closed.slipped
             )
