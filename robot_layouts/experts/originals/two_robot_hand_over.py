@@ -52,7 +52,7 @@ ALIGNED = 4.0  # rad of way that a hand is worth which is turned as the cube is,
 SIMILAR = 0.5  # cosine between the approach that was planned and that which is taken
 APART = 0.4  # cosine between the approaches of two hands at most
 
-PICKS, MEETINGS, TAKES, SCRIPTS = 3, 16, 600, 6  # how many of each go on, for each depth
+PICKS, MEETINGS, TAKES, SCRIPTS = 3, 16, 600, 4  # how many of each go on, for each depth
 
 
 def hand_over(task: TaskEnv, seed: int) -> NDArray[np.float32]:
@@ -194,7 +194,11 @@ class _Search:
                 f"wherever {TAKER!r} can take the cube from {GIVER!r}, their hands overlap; stand"
                 " them a little farther apart"
             )
-        return [self._script(pick, meeting) for meeting in found]
+        return [
+            self._script(pick, meeting, together=together)
+            for meeting in found
+            for together in (True, False)
+        ]
 
     def _check_opening(self, hand: Hand) -> None:
         """Refuse a hand that the cube does not fit in.
@@ -329,9 +333,16 @@ class _Search:
         """Return whether no robot is inside itself, the other or the table where they meet."""
         giver, taker = self._giver, self._taker
         give, lifted = (giver.opened(row, pick.grip.held) for row in (meeting.give, now))
+        released = giver.opened(meeting.give, pick.grip.share)
+        taken = taker.opened(meeting.take, meeting.grip.held)
         waiting = taker.opened(taker.qpos(self._scene), meeting.grip.share)
+        ready = self._ready(meeting, meeting.take)
         return (
-            self._clear(self._both(give, meeting.take))
+            len(ready) > 0
+            and self._clear(self._both(give, ready.qpos[0]))
+            and self._clear(self._both(give, meeting.take))
+            and self._clear(self._both(give, taken))
+            and self._clear(self._both(released, taken))
             and all(self._clear(self._both(row, waiting)) for row in _between(lifted, give))
             and all(self._clear(self._both(give, row)) for row in _between(waiting, meeting.take))
         )
@@ -370,7 +381,8 @@ class _Search:
             ),
         )
 
-    def _script(self, pick: _Picking, meeting: _Exchange) -> Script:
+    def _script(self, pick: _Picking, meeting: _Exchange, *, together: bool) -> Script:
+        """Return a script; unless both move together, the taker waits until the giver has come."""
         cube_taken = partial(Scene.grasps, robot=TAKER, body=CUBE)
         give_share, take_share = pick.grip.share, meeting.grip.share
         return {
@@ -387,7 +399,11 @@ class _Search:
             ),
             TAKER: (
                 Waypoint(
-                    "ready", joints=partial(self._expect, meeting), share=take_share, near=0.1
+                    "ready",
+                    joints=partial(self._expect, meeting),
+                    share=take_share,
+                    near=0.1,
+                    after=() if together else ("left.present",),
                 ),
                 Waypoint(
                     "around",
@@ -459,9 +475,20 @@ class _Search:
         return self._postures(hand, place, turn, hand.pointing(np.zeros(3)), now)
 
     def _expect(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
+        ready = self._ready(meeting, self._taker.like(scene, meeting.take))
+        return list(self._taker.joints(ready.qpos))
+
+    def _ready(self, meeting: _Exchange, start: Floats) -> HandPostures:
+        """Return the posture near a start in which the taker waits before the cube, if any."""
         place = meeting.place + offsets(meeting.turned[None], self._fit.length(BACK))[0]
-        start = self._taker.like(scene, meeting.take)
-        return self._postures(self._taker, place, meeting.turned, meeting.grip.pose, start)
+        return self._taker.reach(
+            place[None],
+            meeting.turned[None],
+            meeting.grip.pose,
+            start[None],
+            scatter=False,
+            loose=True,
+        )
 
     def _take(self, meeting: _Exchange, scene: Scene) -> Sequence[Floats]:
         """Return postures that hold the cube as the giver holds it by now, about as planned."""
