@@ -11,10 +11,10 @@ import numpy as np
 from layouts import single
 from layouts.validation.collisions import Postures, fixed, nearest
 from layouts.validation.collisions import stand as stand_hulls
+from objects.shapes import Box
 from robot_layouts.kinematics.rotations import Floats, inverse, pose_matrix, quaternion_of, rotate
 from robot_layouts.simulation.checks.trial import NAME, RobotAlone
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
-from robot_layouts.simulation.scene.shapes import Box
 from robots import RobotDescriptor
 from robots.action_split import is_gripper
 from robots.bodies.hulls import convex_hull, load_model
