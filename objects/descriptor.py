@@ -164,7 +164,7 @@ class ObjectDescriptor:
         """
         from objects.solids import lowest
 
-        return -lowest(self.parts, self.rest(rest))
+        return round(-lowest(self.parts, self.rest(rest)), 9) + 0.0
 
     def point(self, name: str) -> NamedPoint:
         """Return one of its points.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 from objects.families.making import (
     CARDBOARD,
     DARK_WOOD,
@@ -87,7 +89,7 @@ def tray(length: float, width: float, rim: float) -> Made:
             (side, 0.0, 0.0),
             depth,
             0.1,
-            0.006,
+            0.012,
             DARK_WOOD,
         )
     ]
@@ -101,7 +103,8 @@ def tray(length: float, width: float, rim: float) -> Made:
             0.012,
             name,
             offsets=(-0.02, 0.0, 0.02),
-            tilts=(-0.4, 0.0, 0.4),
+            tilts=(0.0, -side * pi / 2),
+            pitches=(-0.2, 0.2),
         )
     ]
     return Made(

@@ -6,10 +6,12 @@ from math import cos, pi, sin
 
 from objects.families.making import (
     DOWN,
+    FLAT,
     GREY_PLASTIC,
     ON_SIDE,
     PLASTIC,
     RED_PLASTIC,
+    SECTIONS,
     STEEL,
     UP,
     WOOD,
@@ -43,7 +45,7 @@ def peg(side: float, length: float) -> Made:
         grasp
         for out in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
         for grasp in grips(
-            (0.0, 0.0, 0.6 * length), UP, out, side, "side", offsets=(-0.02, 0.0, 0.02)
+            (0.0, 0.0, 0.5 * length), UP, out, side, "side", offsets=(-0.015, 0.0, 0.015)
         )
     ]
     above = [
@@ -158,13 +160,14 @@ def gear(radius: float, length: float) -> Made:
         [*outer, *inner, *teeth],
         [
             grasp
-            for angle in around(12, 0.0, pi)
+            for angle in around(8, pi / SECTIONS, pi + pi / SECTIONS)
             for grasp in grips(
                 (0.0, 0.0, thick + 0.006),
                 (cos(angle), sin(angle), 0.0),
                 UP,
-                2 * hub,
+                2 * hub * FLAT,
                 "hub",
+                pitches=(-0.15, 0.15),
             )
         ],
         {"bore": point(0.0, 0.0, 0.0, DOWN), "hub": point(0.0, 0.0, thick + 0.012)},
@@ -263,7 +266,7 @@ def plug(apart: float, pin: float) -> Made:
 
 @family(PLUG, fits="plug")
 def outlet(apart: float, pin: float) -> Made:
-    """The outlet of a plug: a standing block with two square holes, open along -x."""
+    """The outlet of a plug: a standing block with two square holes, open along x."""
     hole, high, deep = pin + 2 * GAP, 0.05, 0.03
     wide, middle = apart + 0.05, 0.012  # the holes are as high as a plug's pins
     outer = (wide - apart - hole) / 2
@@ -278,10 +281,10 @@ def outlet(apart: float, pin: float) -> Made:
                 block((deep, outer, hole), (0.0, side * (wide - outer) / 2, middle), GREY_PLASTIC)
                 for side in (-1, 1)
             ),
-            block((back, wide, high), ((deep + back) / 2, 0.0, high / 2), GREY_PLASTIC),
+            block((back, wide, high), (-(deep + back) / 2, 0.0, high / 2), GREY_PLASTIC),
         ],
         grips(
-            (back / 2, 0.0, high - 0.014),
+            (-back / 2, 0.0, high - 0.014),
             (0.0, 1.0, 0.0),
             UP,
             deep + back,
@@ -289,7 +292,7 @@ def outlet(apart: float, pin: float) -> Made:
             offsets=(-0.015, 0.0, 0.015),
             pitches=(-0.4, -0.2, 0.0, 0.2),
         ),
-        {"holes": point(-deep / 2, 0.0, middle, (-1.0, 0.0, 0.0))},
+        {"holes": point(deep / 2, 0.0, middle, (1.0, 0.0, 0.0))},
     )
 
 

@@ -56,6 +56,7 @@ CARDBOARD = matter(700, 0.5, "#C59A6B")
 CERAMIC = matter(2300, 0.45, "#E9E4D8", 0.4)
 CLAY = matter(1900, 0.6, "#A6523A")
 GLAZE = matter(2300, 0.45, "#3C6E8F", 0.4)
+MELAMINE = matter(1500, 0.45, "#E9E4D8", 0.4)
 PLASTIC = matter(950, 0.4, "#2F78C4", 0.5)
 RED_PLASTIC = matter(950, 0.4, "#C8412F", 0.5)
 GREY_PLASTIC = matter(950, 0.4, "#6E757C", 0.5)
@@ -207,30 +208,34 @@ def walls(
     ]
 
 
+def bar(start: Axis | Floats, end: Axis | Floats, thick: float, made_of: Matter) -> Box:
+    """Return a square bar between the middles of its ends."""
+    along = np.subtract(end, start)
+    length = float(np.linalg.norm(along))
+    half = (length / 2, thick / 2, thick / 2)
+    turned, middle = _turn(along / length), _place(np.add(start, end) / 2)
+    return Box(_place(half), position=middle, quaternion=turned, **made_of)
+
+
 def loop(
-    root: Axis, along: Axis, out: Axis, depth: float, length: float, radius: float, made_of: Matter
+    root: Axis, along: Axis, out: Axis, depth: float, length: float, thick: float, made_of: Matter
 ) -> list[Shape]:
-    """Return a handle: a round bar that two arms hold off a surface.
+    """Return a handle: a square bar that two arms hold off a surface.
 
     Args:
         root: Middle of the handle on the surface.
         along: Direction of the bar, of length 1.
         out: Direction away from the surface, of length 1.
         depth: How far the bar's middle is from the surface.
-        length: Of the bar, arms included.
-        radius: Of bar and arms.
+        length: Of the bar.
+        thick: Of bar and arms.
         made_of: Their material.
     """
-    half = length / 2 - radius
-    ends = [np.add(root, np.multiply(along, side * half)) for side in (-1, 1)]
-    tips = [end + np.multiply(out, depth) for end in ends]
-    bar = rod(
-        tips[0] - radius * np.array(along), tips[1] + radius * np.array(along), radius, made_of
-    )
-    arms = [
-        rod(e, t - radius * np.array(out), radius, made_of) for e, t in zip(ends, tips, strict=True)
-    ]
-    return [bar, *arms]
+    ends = [np.add(root, np.multiply(along, side * (length - thick) / 2)) for side in (-1, 1)]
+    reach, corner = np.multiply(out, depth), np.multiply(along, thick / 2)
+    held = bar(ends[0] + reach - corner, ends[1] + reach + corner, thick, made_of)
+    tips = [end + np.multiply(out, depth - thick / 2) for end in ends]
+    return [held, *(bar(*arm, thick, made_of) for arm in zip(ends, tips, strict=True))]
 
 
 def grips(
@@ -274,7 +279,9 @@ def around(count: int, first: float = 0.0, last: float = 2 * pi) -> list[float]:
     return [first + (last - first) * i / count for i in range(count)]
 
 
-def rim(bottom: Ring, top: Ring, wall: float, facets: Sequence[int]) -> list[Grasp]:
+def rim(
+    bottom: Ring, top: Ring, wall: float, facets: Sequence[int], deep: float = DEEP
+) -> list[Grasp]:
     """Return grasps of the upper edge of a `shell`, along its slope.
 
     Args:
@@ -282,12 +289,13 @@ def rim(bottom: Ring, top: Ring, wall: float, facets: Sequence[int]) -> list[Gra
         top: See `shell`.
         wall: See `shell`.
         facets: Which of its flat faces, counted from the x axis on.
+        deep: How far below the edge.
     """
     outward = (top[0] - bottom[0]) * FLAT
     steep = np.array([outward, top[1] - bottom[1]]) / hypot(outward, top[1] - bottom[1])
     aside = np.array([steep[1], -steep[0]])  # out of the wall; both are of radius and height
     wide = wall * float(steep[1])
-    radius, height = np.array([top[0] * FLAT, top[1]]) - DEEP * steep - wide / 2 * aside
+    radius, height = np.array([top[0] * FLAT, top[1]]) - deep * steep - wide / 2 * aside
     found: list[Grasp] = []
     for facet in facets:
         angle = 2 * pi * (facet + 0.5) / SECTIONS

@@ -107,7 +107,7 @@ def brick(length: float, width: float, height: float) -> Made:
 @family({"length": Size(0.26, 0.2, 0.3), "head": Size(0.09, 0.075, 0.11)})
 def hammer(length: float, head: float) -> Made:
     """A hammer that lies on its side."""
-    radius, side = 0.012, 0.026
+    radius, side = 0.012, 0.024
     start, end = (-length / 2, 0.0, side / 2), (length / 2 - side, 0.0, side / 2)
     return Made(
         [
@@ -138,7 +138,7 @@ def screwdriver(length: float, handle: float) -> Made:
     return Made(
         [
             hexagon((-length / 2, 0.0, z), grip, handle, RED_PLASTIC),
-            rod((-length / 2 + grip, 0.0, z), (length / 2, 0.0, z), 0.0035, STEEL),
+            rod((-length / 2 + grip, 0.0, z), (length / 2, 0.0, z), 0.0025, STEEL),
         ],
         grips(
             (-length / 2 + grip / 2, 0.0, z),
@@ -177,7 +177,7 @@ def spoon(length: float, bowl: float) -> Made:
             UP,
             0.012,
             "handle",
-            offsets=(-0.03, -0.01, 0.01, 0.03),
+            offsets=(-0.05, -0.035, -0.02, -0.005),
             pitches=(-0.3, 0.0, 0.3),
         ),
         {

@@ -12,6 +12,7 @@ from objects.families.making import (
     FLAT,
     GLAZE,
     GREY_PLASTIC,
+    MELAMINE,
     ON_SIDE,
     OVER,
     PLASTIC,
@@ -34,7 +35,12 @@ from objects.families.making import (
 from objects.family import Made, Size, family
 from robots.descriptor import IDENTITY
 
-LEAN = (-0.5, 0.0, 0.5)  # rad; tilts of a gripper at a bar
+SIDES = (
+    -pi / 2,
+    0.0,
+    pi / 2,
+)  # rad; tilts of a gripper at a square bar
+LEAN = (-0.5, 0.0, 0.5)  # rad; tilts of a gripper at a round bar
 
 BOTTLE = {
     "radius": Size(0.032, 0.026, 0.036),
@@ -63,7 +69,7 @@ def mug(radius: float, height: float, wall: float) -> Made:
     """A mug with a handle."""
     floor, depth, long = 1.25 * wall, 0.03, 0.6 * height
     root, out = (radius - 0.3 * wall, 0.0, 0.52 * height), (1.0, 0.0, 0.0)
-    handle = loop(root, UP, out, depth, long, 0.005, GLAZE)
+    handle = loop(root, UP, out, depth, long, 0.01, GLAZE)
     grip = (root[0] + depth, 0.0, root[2])
     return Made(
         [
@@ -72,7 +78,7 @@ def mug(radius: float, height: float, wall: float) -> Made:
             *handle,
         ],
         [
-            *grips(grip, UP, out, 0.01, "handle", offsets=(-0.008, 0.008), tilts=LEAN),
+            *grips(grip, UP, out, 0.01, "handle", offsets=(-0.008, 0.008), tilts=SIDES),
             *rim((radius, floor), (radius, height), wall, range(3, 13)),
         ],
         {
@@ -93,7 +99,7 @@ def mug(radius: float, height: float, wall: float) -> Made:
 )
 def cup(bottom: float, top: float, height: float) -> Made:
     """A cup that widens to its rim, without a handle."""
-    wall, floor = 0.003, 0.004
+    wall, floor = 0.004, 0.004
     low, high = (bottom, floor), (top, height)
     return Made(
         [disc(bottom, 0.0, floor, RED_PLASTIC), *shell(low, high, wall, RED_PLASTIC)],
@@ -126,8 +132,8 @@ def plate(radius: float, height: float) -> Made:
     wall, floor, flat = 0.012, 0.005, 0.62 * radius
     low, high = (flat, 0.001), (radius, height)
     return Made(
-        [disc(flat - wall, 0.0, floor, CERAMIC), *shell(low, high, wall, CERAMIC)],
-        rim(low, high, wall, range(SECTIONS)),
+        [disc(flat - wall, 0.0, floor, MELAMINE), *shell(low, high, wall, MELAMINE)],
+        rim(low, high, wall, range(SECTIONS), deep=0.016),
         {"middle": point(0.0, 0.0, floor), "bottom": point(0.0, 0.0, 0.0, DOWN)},
     )
 
@@ -147,24 +153,21 @@ def pot_two_handles(radius: float, height: float, wall: float) -> Made:
             (side, 0.0, 0.0),
             depth,
             0.085,
-            0.006,
+            0.012,
             GREY_PLASTIC,
         )
     ]
     grasps = [
         grasp
         for side, name in ((1.0, "right handle"), (-1.0, "left handle"))
-        for grasp in (
-            *grips(
-                (side * bar, 0.0, at),
-                (0.0, 1.0, 0.0),
-                (side, 0.0, 0.0),
-                0.012,
-                name,
-                offsets=(-0.015, 0.015),
-                tilts=LEAN,
-            ),
-            *grips((side * bar, 0.0, at), (0.0, 1.0, 0.0), UP, 0.012, name),
+        for grasp in grips(
+            (side * bar, 0.0, at),
+            (0.0, 1.0, 0.0),
+            (side, 0.0, 0.0),
+            0.012,
+            name,
+            offsets=(-0.015, 0.0, 0.015),
+            tilts=(0.0, -side * pi / 2),
         )
     ]
     return Made(
@@ -254,14 +257,19 @@ def jug(radius: float, height: float) -> Made:
         [
             disc(radius, 0.0, floor, PLASTIC),
             *shell((radius, floor), (radius, height), wall, PLASTIC),
-            *loop(root, UP, out, depth, 0.65 * height, 0.006, PLASTIC),
+            *loop(root, UP, out, depth, 0.65 * height, 0.012, PLASTIC),
             block((0.022, 0.025, 0.003), (radius + 0.008, 0.0, height - 0.0215), PLASTIC),
             *lip,
         ],
-        [
-            *grips(grip, UP, out, 0.012, "handle", offsets=(-0.02, 0.0, 0.02), tilts=LEAN),
-            *rim((radius, floor), (radius, height), wall, (3, 4, 11, 12)),
-        ],
+        grips(
+            grip,
+            UP,
+            out,
+            0.012,
+            "handle",
+            offsets=(-0.021, -0.007, 0.007, 0.021),
+            tilts=SIDES,
+        ),
         {
             "spout": point(radius + 0.019, 0.0, height - 0.02, (1.0, 0.0, 0.0)),
             "rim": point(0.0, 0.0, height),
