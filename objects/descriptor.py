@@ -112,21 +112,21 @@ class ObjectDescriptor:
         for name, quaternion in self.rests.items():
             expect_unit(f"{self.name}: rests[{name!r}]", quaternion, DescriptorError)
         for name in ("rests", "points", "sizes"):
-            object.__setattr__(self, name, _Frozen(getattr(self, name)))
+            object.__setattr__(self, name, _FrozenMapping(getattr(self, name)))
 
     @property
     def mass(self) -> float:
         """What it weighs (kg)."""
-        from objects.solids import solid
+        from objects.solids import mass_of
 
-        return solid(self.parts).mass
+        return mass_of(self.parts).mass
 
     @property
     def centre_of_mass(self) -> Place:
         """Its centre of mass, in its own frame (m)."""
-        from objects.solids import solid
+        from objects.solids import mass_of
 
-        x, y, z = solid(self.parts).centre.tolist()
+        x, y, z = mass_of(self.parts).centre.tolist()
         return x, y, z
 
     @property
@@ -217,14 +217,14 @@ class ObjectDescriptor:
         return f"ObjectDescriptor({self.name!r}{member}: {counts})"
 
 
-class _Frozen(dict[str, object]):
+class _FrozenMapping(dict[str, object]):
     """A dict that hashes by its items and refuses to change (and still pickles)."""
 
     def __hash__(self) -> int:  # type: ignore[override]
         return hash(tuple(self.items()))
 
     def __reduce__(self) -> tuple[object, ...]:
-        return (_Frozen, (dict(self),))
+        return (_FrozenMapping, (dict(self),))
 
     def _refuse(self, *_: object, **__: object) -> None:
         raise TypeError("a descriptor is frozen; use dataclasses.replace to change it")

@@ -1,14 +1,13 @@
-"""``robot-layouts objects list`` and ``show``, and what there is to know about a thing, as text."""
+"""``robot-layouts objects list``, and what there is to know about a thing, as text."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Annotated
 
 from objects.descriptor import ObjectDescriptor
 from objects.registry import ObjectRegistry
 from objects.shapes import Mesh
-from robot_layouts.core.cli import File, Seed, Word
+from robot_layouts.core.cli import Word
 from robot_layouts.core.commands import print_error, printable
 
 OBJECT = Word("OBJECT", about="a name that `robot-layouts objects list` prints")
@@ -29,30 +28,6 @@ def list_objects() -> int:
     for failure in failures:
         print_error(failure)
     return 1 if failures else 0
-
-
-def show(
-    objects: Sequence[Annotated[str, OBJECT]] = (),
-    *,
-    out: File,
-    seed: Seed | None = None,
-    grasps: bool = False,
-) -> None:
-    """Draw objects side by side; it needs no graphics driver.
-
-    Args:
-        objects: The objects (default: all).
-        out: Picture to save (.png, .pdf, .svg).
-        seed: Draws a member of each object's family (default: the usual ones).
-        grasps: Draw a fork where a gripper holds an object, for each of its grasps.
-
-    Raises:
-        RobotLayoutsError: If an object does not exist, or the picture cannot be saved.
-    """
-    from objects.picture import save_sheet
-
-    things = [ObjectRegistry.load(name, seed) for name in objects or ObjectRegistry.names()]
-    print(f"picture: {save_sheet(things, out, grasps=grasps)}")
 
 
 def report(thing: ObjectDescriptor) -> str:

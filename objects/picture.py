@@ -1,4 +1,4 @@
-"""Things as pictures: a sheet of them, each as its parts look, with what it weighs and how large.
+"""``robot-layouts objects show``: a sheet of things, each with how large and how heavy it is.
 
 Drawn without a graphics driver: a parallel projection, the nearest triangle for each pixel.
 """
@@ -9,13 +9,16 @@ import os
 from collections.abc import Sequence
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from objects.descriptor import ObjectDescriptor
+from objects.inspect import OBJECT
+from objects.registry import ObjectRegistry
 from objects.solids import surface
+from robot_layouts.core.cli import File, Seed
 from robot_layouts.core.errors import DescriptorError
 from robot_layouts.core.figures import COLOURS, FAINT, INK, blank_figure, save_figure
 from robot_layouts.kinematics.rotations import Floats, rotate, rotation_of
@@ -30,6 +33,28 @@ EYE, LIGHT = np.array([0.75, -1.0, 0.85]), np.array([0.35, -0.5, 1.0])
 SHADE, MARGIN = 0.45, 0.06  # how dark what faces away is; share that stays empty on each side
 HAND = 0.02  # m; length of the line behind a grasp, and of its jaws
 _LINEAR = 1 / 2.2  # exponent from light to what screens encode
+
+
+def show(
+    objects: Sequence[Annotated[str, OBJECT]] = (),
+    *,
+    out: File,
+    seed: Seed | None = None,
+    grasps: bool = False,
+) -> None:
+    """Draw objects side by side; it needs no graphics driver.
+
+    Args:
+        objects: The objects (default: all).
+        out: Picture to save (.png, .pdf, .svg).
+        seed: Draws a member of each object's family (default: the usual ones).
+        grasps: Draw a fork where a gripper holds an object, for each of its grasps.
+
+    Raises:
+        RobotLayoutsError: If an object does not exist, or the picture cannot be saved.
+    """
+    things = [ObjectRegistry.load(name, seed) for name in objects or ObjectRegistry.names()]
+    print(f"picture: {save_sheet(things, out, grasps=grasps)}")
 
 
 def save_sheet(

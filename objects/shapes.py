@@ -171,7 +171,7 @@ class Capsule(Shape):
 
 
 @dataclass(frozen=True)
-class Hull(Shape):
+class ConvexHull(Shape):
     """The convex hull of some points.
 
     Attributes:
@@ -189,11 +189,11 @@ class Hull(Shape):
         super().__post_init__()
         if not FEWEST_CORNERS <= len(self.corners) <= MOST_CORNERS:
             raise SimulationError(
-                f"Hull: corners has {len(self.corners)} entries; it must have {FEWEST_CORNERS} to"
-                f" {MOST_CORNERS}"
+                f"ConvexHull: corners has {len(self.corners)} entries; it must have"
+                f" {FEWEST_CORNERS} to {MOST_CORNERS}"
             )
         if _is_flat(self.corners):
-            raise SimulationError("Hull: corners lie in one plane; a hull needs a volume")
+            raise SimulationError("ConvexHull: corners lie in one plane; a hull needs a volume")
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,7 @@ class Floor(Shape):
     collides: bool = field(default=False, kw_only=True)
 
 
-SIZED = (Box, Sphere, Cylinder, Capsule, Hull, Mesh)
+SIZED = (Box, Sphere, Cylinder, Capsule, ConvexHull, Mesh)
 """Shapes that can be larger or smaller."""
 
 
@@ -255,7 +255,7 @@ def scaled(shape: Shape, factor: float) -> Shape:
         case Cylinder() | Capsule():
             radius, half_length = moved.radius * factor, moved.half_length * factor
             return replace(moved, radius=radius, half_length=half_length)
-        case Hull():
+        case ConvexHull():
             corners = [[along * factor for along in corner] for corner in moved.corners]
             return replace(moved, corners=corners)
         case Mesh(scale=(a, b, c)):

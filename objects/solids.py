@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from objects.shapes import Box, Capsule, Cylinder, Hull, Mesh, Place, Shape, Sphere
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Place, Shape, Sphere
 from robot_layouts.core.errors import DescriptorError
 from robot_layouts.kinematics.rotations import Floats, inverse, pose_matrix, rotate, transform
 
@@ -20,7 +20,7 @@ _SAME_PLANE = 1e-7  # m; corners this near to a plane are in it
 _BOX = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
-class Surface(NamedTuple):
+class Triangles(NamedTuple):
     """Triangles of the surface of a convex shape.
 
     Attributes:
@@ -38,7 +38,7 @@ class Surface(NamedTuple):
         return np.cross(two - one, three - one)
 
 
-class Solid(NamedTuple):
+class MassProperties(NamedTuple):
     """What shapes weigh together.
 
     Attributes:
@@ -52,7 +52,7 @@ class Solid(NamedTuple):
     centre: Floats
 
 
-def solid(shapes: Iterable[Shape]) -> Solid:
+def mass_of(shapes: Iterable[Shape]) -> MassProperties:
     """Return what the shapes of a body that collide weigh together.
 
     Raises:
@@ -66,7 +66,7 @@ def solid(shapes: Iterable[Shape]) -> Solid:
             moment += own * shape.density * transform(_pose(shape), centre)
     if not mass:
         raise DescriptorError("no shape of this body collides, so that it weighs nothing")
-    return Solid(volume, mass, moment / mass)
+    return MassProperties(volume, mass, moment / mass)
 
 
 def reach(shapes: Iterable[Shape], way: Floats) -> float:
@@ -104,17 +104,17 @@ def bounds(shapes: Iterable[Shape]) -> tuple[Floats, Floats]:
     return low, high
 
 
-def surface(shape: Shape) -> Surface:
+def surface(shape: Shape) -> Triangles:
     """Return the surface of a shape in the body's frame; round ones have flat faces.
 
     Raises:
         DescriptorError: If it is a plane or a floor, or its file cannot be read.
     """
     corners, triangles = _surface(shape)
-    return Surface(transform(_pose(shape), corners), triangles)
+    return Triangles(transform(_pose(shape), corners), triangles)
 
 
-def sampled(found: Surface, count: int, random: np.random.Generator) -> Floats:
+def sampled(found: Triangles, count: int, random: np.random.Generator) -> Floats:
     """Return points on a surface, drawn evenly, (count, 3) (m)."""
     areas = np.linalg.norm(found.normals, axis=1)
     chosen = random.choice(len(areas), count, p=areas / areas.sum())
@@ -223,7 +223,7 @@ def _reach(shape: Shape, way: Floats) -> float:
 def _surface(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
     """Return corners in a shape's own frame, (n, 3) (m), and triangles, (t, 3)."""
     match shape:
-        case Hull():
+        case ConvexHull():
             return np.array(shape.corners), hull_triangles(shape.corners)
         case Box():
             return _BOX * shape.half_size, hull_triangles(tuple(map(tuple, _BOX.tolist())))

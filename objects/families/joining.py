@@ -23,10 +23,10 @@ from objects.families.making import (
     polygon,
     prism,
     tube,
+    yaw,
 )
 from objects.family import Made, Size, family
 from objects.shapes import Shape
-from robot_layouts.kinematics.quaternions import yaw_quaternion
 from robots.descriptor import IDENTITY
 
 TEETH = 12
@@ -149,7 +149,7 @@ def gear(radius: float, length: float) -> Made:
                 thick / 2,
             ),
             RED_PLASTIC,
-            yaw_quaternion(angle),
+            yaw(angle),
         )
         for angle in around(TEETH)
     ]

@@ -14,7 +14,7 @@ from typing import TypedDict
 import numpy as np
 
 from objects.descriptor import Grasp, NamedPoint
-from objects.shapes import Box, Color, Cylinder, Finish, Friction, Hull, Place, Shape, linear
+from objects.shapes import Box, Color, ConvexHull, Cylinder, Finish, Friction, Place, Shape, linear
 from robot_layouts.kinematics.rotations import Floats, quaternion_of, rotation_about
 from robots.descriptor import IDENTITY, Quaternion
 
@@ -44,13 +44,16 @@ class Matter(TypedDict):
 
 def matter(density: float, friction: float, code: str, roughness: float = 0.7) -> Matter:
     """Return a material: density (kg/m³), coefficient of friction, colour such as ``"#FFD289"``."""
-    finish = Finish(roughness=roughness, specular=0.3)
+    red, green, blue = (round(tone, _DIGITS) for tone in linear(code)[:3])
     return Matter(
-        density=density, friction=Friction(friction, friction), color=linear(code), finish=finish
+        density=density,
+        friction=Friction(friction, friction),
+        color=(red, green, blue, 1.0),
+        finish=Finish(roughness=roughness, specular=0.3),
     )
 
 
-# Densities and coefficients as tables of engineering handbooks give them for the kind of material.
+# Densities and coefficients of friction are typical of the kind of material, not measured.
 ALUMINIUM = matter(2700, 0.45, "#B8BEC6", 0.3)
 CARDBOARD = matter(700, 0.5, "#C59A6B")
 CERAMIC = matter(2300, 0.45, "#E9E4D8", 0.4)
@@ -107,20 +110,20 @@ def rod(start: Axis | Floats, end: Axis | Floats, radius: float, made_of: Matter
 
 def prism(
     outline: Sequence[tuple[float, float]], bottom: float, top: float, made_of: Matter
-) -> Hull:
+) -> ConvexHull:
     """Return what stands on a convex outline in x and y."""
     corners = [_place((x, y, z)) for z in (bottom, top) for x, y in outline]
-    return Hull(tuple(corners), **made_of)
+    return ConvexHull(tuple(corners), **made_of)
 
 
-def taper(low: float, bottom: float, high: float, top: float, made_of: Matter) -> Hull:
+def taper(low: float, bottom: float, high: float, top: float, made_of: Matter) -> ConvexHull:
     """Return what narrows from one radius at the bottom to another at the top."""
     ends = ((low, bottom), (high, top))
     corners = [_place((x, y, z)) for radius, z in ends for x, y in polygon(radius, SECTIONS)]
-    return Hull(tuple(corners), **made_of)
+    return ConvexHull(tuple(corners), **made_of)
 
 
-def hexagon(start: Axis, length: float, radius: float, made_of: Matter) -> Hull:
+def hexagon(start: Axis, length: float, radius: float, made_of: Matter) -> ConvexHull:
     """Return a hexagonal bar along x from the middle of its end; two of its sides are level."""
     x, y, z = start
     corners = [
@@ -128,7 +131,7 @@ def hexagon(start: Axis, length: float, radius: float, made_of: Matter) -> Hull:
         for at in (x, x + length)
         for aside, up in polygon(radius, 6)
     ]
-    return Hull(tuple(corners), **made_of)
+    return ConvexHull(tuple(corners), **made_of)
 
 
 def polygon(radius: float, corners: int, turned: float = 0.0) -> list[tuple[float, float]]:
@@ -164,7 +167,7 @@ def tube(
             for ring in rings
             for at in (i, j)
         ]
-        wedges.append(Hull(tuple(corners), **made_of))
+        wedges.append(ConvexHull(tuple(corners), **made_of))
     return wedges
 
 
@@ -344,6 +347,11 @@ def _edge(
 ) -> list[Grasp]:
     places = [share * half for share in offsets]
     return grips(middle, along, (0.0, 0.0, 1.0), wall, part, offsets=places)
+
+
+def yaw(angle: float) -> Quaternion:
+    """Return a turn about z (rad), wxyz."""
+    return round(cos(angle / 2), _DIGITS), 0.0, 0.0, round(sin(angle / 2), _DIGITS)
 
 
 def point(x: float, y: float, z: float, away: Axis = (0.0, 0.0, 1.0)) -> NamedPoint:

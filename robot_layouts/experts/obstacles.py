@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from objects.shapes import Box, Capsule, Cylinder, Hull, Mesh, Plane, Shape, Sphere
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
 from robot_layouts.experts.script import Pose, Scene
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
 from robot_layouts.motion.model.obstacles import Obstacle, box, cylinder, mesh, sphere
@@ -58,7 +58,7 @@ def _corners(shape: Shape) -> Floats:
             ball = _of(sphere("a ball", shape.radius))
             ends = [ball + (side * shape.half_length, 0.0, 0.0) for side in (-1, 1)]
             return np.concatenate(ends)
-        case Hull():
+        case ConvexHull():
             return np.array(shape.corners)
         case Mesh():
             return _of(mesh("a mesh", shape.file, scale=shape.scale))

@@ -8,7 +8,7 @@ from robot_layouts.core.own_packages import expect_own
 
 expect_own("robots", "objects", "layouts")
 
-from objects.shapes import Box, Capsule, Cylinder, Hull, Mesh, Plane, Shape, Sphere
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
 from robot_layouts.simulation.sapien3.world import build_scene
 from robot_layouts.simulation.scene.cameras import Camera
@@ -22,9 +22,9 @@ __all__ = [
     "Box",
     "Camera",
     "Capsule",
+    "ConvexHull",
     "Cylinder",
     "Friction",
-    "Hull",
     "Mesh",
     "PhysicsSettings",
     "Plane",

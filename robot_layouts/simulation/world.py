@@ -212,7 +212,7 @@ class World:
             if not isinstance(shape, Shape):
                 raise SimulationError(
                     f"body {name!r}: {shown(shape)} is no shape; shapes are Box, Sphere, Cylinder,"
-                    " Capsule, Hull, Mesh and Plane"
+                    " Capsule, ConvexHull, Mesh and Plane"
                 )
         checked_choice(f"body {name!r}: kind", kind, _KINDS, SimulationError)
 

@@ -31,7 +31,7 @@ def test_a_report_says_everything_of_a_member():
         f"radius         {jug.sizes['radius']:g} m",
         "spout ",
         "handle: 24, 12 mm wide",
-        "16 Hull",
+        "16 ConvexHull",
         "950 kg/m³, friction 0.4",
         "upright: its origin 0 m above the table",
     ):

@@ -135,7 +135,7 @@ def test_what_is_made_for_each_other_fits(seed):
 
 
 def _is_wedge(part):
-    return type(part).__name__ == "Hull" and len(part.corners) == 8
+    return type(part).__name__ == "ConvexHull" and len(part.corners) == 8
 
 
 def _hole_side(part):

@@ -8,7 +8,7 @@ import pytest
 from layouts import single
 from objects import ObjectRegistry
 from objects.registry import CATALOGUE
-from objects.shapes import Box, Friction, Hull
+from objects.shapes import Box, ConvexHull, Friction
 from objects.solids import sampled, surface
 from robot_layouts.__main__ import main
 from robot_layouts.simulation import Camera, Simulation
@@ -50,8 +50,10 @@ def test_what_collides_is_what_is_seen(built, name):
     """Points of what is drawn are nearer than 3 mm, on average, to the shapes that physics has."""
     random, distances = np.random.default_rng(0), list[np.ndarray]()
     thing, shapes = ObjectRegistry.load(name), built[name].component.collision_shapes
-    order = [p for p in thing.parts if not isinstance(p, Hull)]  # hulls are attached at the end
-    order += [p for p in thing.parts if isinstance(p, Hull)]
+    order = [
+        p for p in thing.parts if not isinstance(p, ConvexHull)
+    ]  # hulls are attached at the end
+    order += [p for p in thing.parts if isinstance(p, ConvexHull)]
     assert len(shapes) == len(order)
     for part, shape in zip(order, shapes, strict=True):
         assert part.visible
@@ -59,7 +61,7 @@ def test_what_collides_is_what_is_seen(built, name):
         points = sampled(surface(part), 200, random)
         inside = shape.local_pose.inv().to_transformation_matrix()
         points = points @ inside[:3, :3].T + inside[:3, 3]
-        if isinstance(part, Hull):
+        if isinstance(part, ConvexHull):
             planes = _planes(np.asarray(shape.vertices, float), np.asarray(shape.triangles))
             distances.append(np.abs((points @ planes[:, :3].T - planes[:, 3]).max(axis=1)))
         elif isinstance(part, Box):
@@ -85,7 +87,7 @@ def pair(*, visuals=False):
 
     def build(world, number):
         world.add("box", Box((0.1, 0.05, 0.02), **rough), position=(1.0, -0.3, 0.3))
-        world.add("hull", Hull(tuple(CORNERS), **rough), position=(1.0, 0.3, 0.3))
+        world.add("hull", ConvexHull(tuple(CORNERS), **rough), position=(1.0, 0.3, 0.3))
 
     return Simulation(single({"arm": "panda"}), build, 1, visuals=visuals)
 

@@ -8,7 +8,7 @@ import numpy as np
 import sapien
 import sapien.physx as physx
 
-from objects.shapes import Box, Capsule, Cylinder, Hull, Mesh, Plane, Shape, Sphere
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
 
 # What a collision shape may have, besides its place in the body.
 _SIZES = ("half_size", "radius", "half_length", "scale", "vertices", "triangles")
@@ -16,7 +16,7 @@ _SIZES = ("half_size", "radius", "half_length", "scale", "vertices", "triangles"
 
 def add_collision(builder: Any, shape: Shape) -> None:
     """Add a shape to a SAPIEN actor builder, if it takes part in contacts and is no hull."""
-    if not shape.collides or isinstance(shape, Hull):
+    if not shape.collides or isinstance(shape, ConvexHull):
         return
     common: dict[str, Any] = {"pose": _pose(shape), "material": _material(shape)}
     match shape:
@@ -45,7 +45,7 @@ def attach_hulls(component: Any, shapes: tuple[Shape, ...]) -> None:
     SAPIEN's builder takes hulls from files alone; PhysX takes their corners.
     """
     for shape in shapes:
-        if isinstance(shape, Hull) and shape.collides:
+        if isinstance(shape, ConvexHull) and shape.collides:
             corners = np.array(shape.corners, np.float32)
             material = _material(shape) or physx.get_default_material()
             hull = physx.PhysxCollisionShapeConvexMesh(

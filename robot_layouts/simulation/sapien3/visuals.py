@@ -22,15 +22,15 @@ from sapien.render import (
 from objects.shapes import (
     Box,
     Capsule,
+    ConvexHull,
     Cylinder,
     Floor,
-    Hull,
     Mesh,
     Plane,
     Shape,
     Sphere,
 )
-from objects.solids import Surface, hull_triangles
+from objects.solids import Triangles, hull_triangles
 from robots.descriptor import Vector3
 
 _PLANE_HALF_SIZE = 50.0  # of what is drawn of an infinite plane (m)
@@ -87,7 +87,7 @@ def _visual(shape: Shape) -> Any:
             return RenderShapeCapsule(shape.radius, shape.half_length, _material(shape))
         case Plane():
             return RenderShapePlane([_PLANE_HALF_SIZE] * 3, _material(shape))
-        case Hull():
+        case ConvexHull():
             return _hull(shape)
         case Mesh():
             return _mesh(shape)
@@ -118,10 +118,10 @@ def _mesh(shape: Mesh) -> RenderShapeTriangleMesh:
     return mesh
 
 
-def _hull(shape: Hull) -> RenderShapeTriangleMesh:
+def _hull(shape: ConvexHull) -> RenderShapeTriangleMesh:
     """Flat faces: each triangle has corners of its own."""
     triangles = hull_triangles(shape.corners)
-    normals = Surface(np.array(shape.corners), triangles).normals
+    normals = Triangles(np.array(shape.corners), triangles).normals
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     return RenderShapeTriangleMesh(
         vertices=np.array(shape.corners)[triangles].reshape(-1, 3),
