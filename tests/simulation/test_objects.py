@@ -9,7 +9,7 @@ from layouts import single
 from objects import ObjectRegistry
 from objects.registry import CATALOGUE
 from objects.shapes import Box, ConvexHull, Friction
-from objects.solids import sampled, surface
+from objects.solids import bounds, sampled, surface
 from robot_layouts.__main__ import main
 from robot_layouts.simulation import Camera, Simulation
 from robot_layouts.simulation.checks.objects import (
@@ -134,6 +134,59 @@ def test_things_stand_still_for_ten_seconds():
 def test_members_of_every_family_stand_still_for_ten_seconds():
     members = [ObjectRegistry.load(name, seed) for name in CATALOGUE for seed in range(5)]
     assert [trial.problem for trial in try_rests(members) if trial.problem] == []
+
+
+MATES = {
+    "bolt": "nut",
+    "bottle": "bottle_cap",
+    "box": "box_lid",
+    "pot_two_handles": "pot_lid",
+    "shaft": "gear",
+    "socket": "peg",
+}
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2])
+def test_what_is_made_for_each_other_goes_together(seed):
+    """Let go 3 mm above each other, one slides onto or into the other and stays upright."""
+    pairs = [[ObjectRegistry.load(name, seed) for name in pair] for pair in MATES.items()]
+
+    def build(world, number):
+        below, above = pairs[number]
+        height = bounds(below.parts)[1][2] - bounds(above.parts)[0][2] + 0.003
+        world.add("below", *below.parts, kind="kinematic", position=(0.0, 0.0, below.height()))
+        world.add("above", *above.parts, position=(0.0, 0.0, height + below.height()))
+
+    simulation = Simulation(single({"arm": "panda"}), build, len(pairs))
+    start = simulation.read().pose("above")
+    for _ in range(40):
+        simulation.coast(range(len(pairs)))
+    end = simulation.read().pose("above")
+    for (_, above), before, after in zip(pairs, start, end, strict=True):
+        assert np.abs(after[:2]).max() < 3e-3, above.name
+        assert abs(after[3]) > 0.999, above.name
+        assert before[2] - after[2] > 0.005, above.name
+    seats = {"socket": 0.01, "shaft": 0.012}  # m; the tops of their bases
+    for number, (below, _) in enumerate(pairs):
+        if below.name in seats:
+            assert end[number][2] == pytest.approx(seats[below.name], abs=5e-4)
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2, 3])
+def test_a_plug_is_at_rest_in_its_outlet(seed):
+    plug, outlet = ObjectRegistry.load("plug", seed), ObjectRegistry.load("outlet", seed)
+    reach = outlet.point("holes").position[0] - 0.02 + plug.point("tip").position[0]
+
+    def build(world, number):
+        world.add("outlet", *outlet.parts, kind="kinematic")
+        world.add("floor", Box((0.5, 0.5, 0.01)), kind="kinematic", position=(0.516, 0.0, -0.01))
+        world.add("plug", *plug.parts, position=(reach, 0.0, 0.0), quaternion=(0, 0, 0, 1))
+
+    simulation = Simulation(single({"arm": "panda"}), build, 1)
+    for _ in range(20):
+        simulation.coast([0])
+    (pose,) = simulation.read().pose("plug")
+    assert np.abs(pose - (reach, 0, 0, 0, 0, 0, 1)).max() < 1e-3
 
 
 def test_what_topples_or_sinks_is_noticed():

@@ -13,7 +13,16 @@ from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts.obstacles import _obstacle
 from robots import DescriptorError, TaskError, UnknownNameError
-from tasks import Area, MultiRobotTask, Object, World, add_object, register_task
+from tasks import (
+    Area,
+    Fixed,
+    MultiRobotTask,
+    Object,
+    Randomization,
+    World,
+    add_object,
+    register_task,
+)
 from tasks.episode import play
 from tasks.language.fitting import Fit
 from tasks.view import body_parts
@@ -130,6 +139,18 @@ def test_pages_and_motions_know_the_parts():
         assert len(obstacle.shapes) == len(thing.parts)
         corners = np.concatenate(obstacle.shapes)
         assert np.ptp(corners, axis=0) == pytest.approx(thing.extent, rel=0.01)
+
+
+def test_its_size_can_vary_and_it_stands_where_it_did():
+    env = tasks.make(ID, randomization=Randomization(size={"mug": Fixed(1.2)}))
+    env.reset(seed=0)
+    mug = ObjectRegistry.load("mug")
+    component = env.simulation.backend.worlds[0].bodies["mug"].component
+    assert component.mass == pytest.approx(1.2**3 * mug.mass, rel=0.01)
+    start = env.state.pose("mug")
+    for _ in range(10):
+        env.step(np.zeros((1, 8)))
+    assert np.abs(env.state.pose("mug") - start).max() < 1e-3
 
 
 def test_another_member_of_a_family_in_each_episode():
