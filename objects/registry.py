@@ -11,7 +11,7 @@ from robot_layouts.core.quoting import shown
 # Families by the module that makes them; each is an attribute of the same name there.
 _FAMILIES = {
     "containers": ("box", "box_lid", "pallet", "rack", "tote", "tray"),
-    "joining": (*("bolt", "bracket", "gear", "nut", "outlet", "peg", "plug", "shaft", "socket"),),
+    "joining": ("bolt", "bracket", "gear", "nut", "outlet", "peg", "plug", "shaft", "socket"),
     "stock": ("beam", "board", "brick", "hammer", "screwdriver", "spoon"),
     "vessels": (
         *("bottle", "bottle_cap", "bowl", "can", "cup", "jug", "mug", "pan", "plate"),

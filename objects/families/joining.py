@@ -18,6 +18,7 @@ from objects.families.making import (
     around,
     block,
     disc,
+    from_above,
     grips,
     point,
     polygon,
@@ -119,17 +120,7 @@ def shaft(radius: float, length: float) -> Made:
                 "shaft",
                 tilts=around(8),
             ),
-            *(
-                grasp
-                for angle in around(4, 0.0, pi)
-                for grasp in grips(
-                    (0.0, 0.0, base + length - 0.012),
-                    (cos(angle), sin(angle), 0.0),
-                    UP,
-                    2 * radius,
-                    "tip",
-                )
-            ),
+            *from_above(base + length - 0.012, 2 * radius, "tip", around(4, 0.0, pi)),
         ],
         {"tip": point(0.0, 0.0, base + length), "seat": point(0.0, 0.0, base)},
     )
@@ -158,18 +149,13 @@ def gear(radius: float, length: float) -> Made:
     inner = tube((hole, hub, 0.0), (hole, hub, thick + 0.012), RED_PLASTIC)
     return Made(
         [*outer, *inner, *teeth],
-        [
-            grasp
-            for angle in around(8, pi / SECTIONS, pi + pi / SECTIONS)
-            for grasp in grips(
-                (0.0, 0.0, thick + 0.006),
-                (cos(angle), sin(angle), 0.0),
-                UP,
-                2 * hub * FLAT,
-                "hub",
-                pitches=(-0.15, 0.15),
-            )
-        ],
+        from_above(
+            thick + 0.006,
+            2 * hub * FLAT,
+            "hub",
+            around(8, pi / SECTIONS, pi + pi / SECTIONS),
+            pitches=(-0.15, 0.15),
+        ),
         {"bore": point(0.0, 0.0, 0.0, DOWN), "hub": point(0.0, 0.0, thick + 0.012)},
     )
 
@@ -192,17 +178,7 @@ def bolt(radius: float, length: float) -> Made:
                 "shank",
                 tilts=around(8),
             ),
-            *(
-                grasp
-                for angle in around(4, 0.0, pi)
-                for grasp in grips(
-                    (0.0, 0.0, thick + length - 0.012),
-                    (cos(angle), sin(angle), 0.0),
-                    UP,
-                    2 * radius,
-                    "tip",
-                )
-            ),
+            *from_above(thick + length - 0.012, 2 * radius, "tip", around(4, 0.0, pi)),
         ],
         {"tip": point(0.0, 0.0, thick + length), "head": point(0.0, 0.0, 0.0, DOWN)},
     )
@@ -215,18 +191,13 @@ def nut(radius: float, length: float) -> Made:
     flat = outer * cos(pi / 6)
     return Made(
         tube((hole, outer, 0.0), (hole, outer, thick), STEEL, 6),
-        [
-            grasp
-            for angle in around(3, pi / 6, pi + pi / 6)
-            for grasp in grips(
-                (0.0, 0.0, 0.55 * thick),
-                (-sin(angle), cos(angle), 0.0),
-                UP,
-                2 * flat,
-                "flats",
-                pitches=(-0.3, -0.1, 0.1, 0.3),
-            )
-        ],
+        from_above(
+            0.55 * thick,
+            2 * flat,
+            "flats",
+            around(3, 2 * pi / 3, 5 * pi / 3),
+            pitches=(-0.3, -0.1, 0.1, 0.3),
+        ),
         {"bore": point(0.0, 0.0, 0.0, DOWN), "top": point(0.0, 0.0, thick)},
     )
 

@@ -80,11 +80,9 @@ def block(size: Axis, middle: Axis, made_of: Matter, turned: Quaternion = IDENTI
     )
 
 
-def disc(
-    radius: float, bottom: float, top: float, made_of: Matter, x: float = 0.0, y: float = 0.0
-) -> Cylinder:
-    """Return an upright cylinder."""
-    middle = _place((x, y, (bottom + top) / 2))
+def disc(radius: float, bottom: float, top: float, made_of: Matter) -> Cylinder:
+    """Return an upright cylinder about the z axis."""
+    middle = _place((0.0, 0.0, (bottom + top) / 2))
     return Cylinder(
         round(radius, _DIGITS),
         round((top - bottom) / 2, _DIGITS),
@@ -134,10 +132,9 @@ def hexagon(start: Axis, length: float, radius: float, made_of: Matter) -> Conve
     return ConvexHull(tuple(corners), **made_of)
 
 
-def polygon(radius: float, corners: int, turned: float = 0.0) -> list[tuple[float, float]]:
-    """Return the corners of a regular polygon around the origin, the first at an angle."""
-    angles = [turned + 2 * pi * i / corners for i in range(corners)]
-    return [(radius * cos(angle), radius * sin(angle)) for angle in angles]
+def polygon(radius: float, corners: int) -> list[tuple[float, float]]:
+    """Return the corners of a regular polygon around the origin, the first one on the x axis."""
+    return [(radius * cos(angle), radius * sin(angle)) for angle in around(corners)]
 
 
 def tube(
@@ -145,7 +142,6 @@ def tube(
     top: tuple[float, float, float],
     made_of: Matter,
     sections: int = SECTIONS,
-    inside: int | None = None,
 ) -> list[Shape]:
     """Return an upright ring of convex wedges.
 
@@ -154,10 +150,9 @@ def tube(
         top: Likewise.
         made_of: Its material.
         sections: How many wedges, which are corners of its outline.
-        inside: Corners of the hole, a divisor of ``sections``; None for as many.
     """
     ends = [polygon(radius, sections) for radius in (bottom[1], top[1])]
-    holes = [_hole(radius, sections, inside or sections) for radius in (bottom[0], top[0])]
+    holes = [polygon(radius / cos(pi / sections), sections) for radius in (bottom[0], top[0])]
     wedges: list[Shape] = []
     for i in range(sections):
         j = (i + 1) % sections
@@ -182,18 +177,6 @@ def shell(bottom: Ring, top: Ring, wall: float, made_of: Matter) -> list[Shape]:
     """
     ends = [(radius * FLAT - wall, radius, height) for radius, height in (bottom, top)]
     return tube(ends[0], ends[1], made_of)
-
-
-def _hole(radius: float, sections: int, corners: int) -> list[tuple[float, float]]:
-    """Return points of a regular polygon whose sides are so far from the middle."""
-    outline: list[tuple[float, float]] = []
-    for i in range(sections):
-        angle = 2 * pi * i / sections
-        side = 2 * pi / corners
-        off = (angle % side) - side / 2  # from the middle of the polygon's side
-        far = radius / cos(off)
-        outline.append((far * cos(angle), far * sin(angle)))
-    return outline
 
 
 def walls(
@@ -275,6 +258,31 @@ def grips(
             frame = np.stack([np.cross(way, approach), way, approach], axis=1)
             found.append(Grasp(place, _quaternion(frame), round(width, _DIGITS), part))
     return found
+
+
+def from_above(
+    height: float,
+    width: float,
+    part: str,
+    angles: Sequence[float],
+    pitches: Sequence[float] = (0.0,),
+) -> list[Grasp]:
+    """Return grasps of an upright round body at the origin, from above.
+
+    Args:
+        height: Of the fingers' middle.
+        width: Of what is held.
+        part: What it is called.
+        angles: How the gripper is turned: where its x axis points (rad); half a turn has all.
+        pitches: See `grips`.
+    """
+    return [
+        grasp
+        for angle in angles
+        for grasp in grips(
+            (0.0, 0.0, height), (cos(angle), sin(angle), 0.0), UP, width, part, pitches=pitches
+        )
+    ]
 
 
 def around(count: int, first: float = 0.0, last: float = 2 * pi) -> list[float]:

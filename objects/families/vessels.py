@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import pi
 
 from objects.families.making import (
     ALUMINIUM,
@@ -23,6 +23,7 @@ from objects.families.making import (
     around,
     block,
     disc,
+    from_above,
     grips,
     loop,
     point,
@@ -198,14 +199,7 @@ def pot_lid(radius: float, height: float, wall: float) -> Made:
             disc(0.6 * knob, thick, top, GREY_PLASTIC),
             disc(knob, top, top + 0.016, GREY_PLASTIC),
         ],
-        grips((0.0, 0.0, top + 0.008), (1.0, 0.0, 0.0), UP, 2 * knob, "knob", pitches=(0.0,))
-        + [
-            grasp
-            for angle in around(12, 0.2, 0.2 + pi)
-            for grasp in grips(
-                (0.0, 0.0, top + 0.008), (cos(angle), sin(angle), 0.0), UP, 2 * knob, "knob"
-            )
-        ],
+        from_above(top + 0.008, 2 * knob, "knob", around(12, 0.0, pi)),
         {"knob": point(0.0, 0.0, top + 0.016), "bottom": point(0.0, 0.0, -0.006, DOWN)},
     )
 
@@ -331,17 +325,7 @@ def bottle_cap(radius: float, height: float, neck: float) -> Made:
             "side",
             tilts=[angle + pi / 16 for angle in around(8)],
         )
-        + [
-            grasp
-            for angle in around(8, pi / 16, pi + pi / 16)
-            for grasp in grips(
-                (0.0, 0.0, 0.6 * top),
-                (cos(angle), sin(angle), 0.0),
-                UP,
-                2 * outer * FLAT,
-                "side",
-            )
-        ],
+        + from_above(0.6 * top, 2 * outer * FLAT, "side", around(8, pi / 16, pi + pi / 16)),
         {"opening": point(0.0, 0.0, 0.0, DOWN), "top": point(0.0, 0.0, top + wall)},
         _upright_or_over(),
     )
