@@ -17,7 +17,7 @@ else:
     import tomli as tomllib
 
 HOME = Path(__file__).resolve().parents[1]
-PRODUCT = ("robots", "layouts", "tasks", "robot_layouts")
+PRODUCT = ("robots", "objects", "layouts", "tasks", "robot_layouts")
 LIMITS = {
     "strings that name modules of rooms below": 0,
     "files that are opened for writing outside of core": 10,

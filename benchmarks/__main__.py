@@ -8,6 +8,7 @@ from benchmarks.conversions import conversions
 from benchmarks.experts import experts
 from benchmarks.gallery.pages import gallery
 from benchmarks.learned import imitation, reinforcement
+from benchmarks.objects import objects
 from benchmarks.placing import placing
 from benchmarks.planning import planning
 from benchmarks.processors import processors
@@ -34,6 +35,7 @@ PROGRAM = Program(
             collisions,
             planning,
             placing,
+            objects,
             experts,
             conversions,
             processors,

@@ -47,6 +47,9 @@ _FOR_USERS = {
     "robots inspect": "robot_layouts.simulation.checks.try_command:inspect",
     "robots fetch": "robots.fetch_assets:fetch",
     "robots guess": "robots.from_urdf:print_guess",
+    "objects list": "objects.inspect:list_objects",
+    "objects inspect": "robot_layouts.simulation.checks.object_command:inspect",
+    "objects show": "objects.picture:show",
     "new task": "tasks.new_task:new_task",
     "new robot": "robots.new_robot:new_robot",
 }

@@ -18,7 +18,7 @@ Writing a task (functions of arrays are in `tasks.maths`):
     register_task: Gives it its names.
     Needs: What a place needs of the robot that stands there.
     Fit: How its places and sizes suit the robots that it is made with, if it ``fits_robots``.
-    Cube, Goal, Table, Area, …: Bodies that it declares, and where they begin.
+    Cube, Object, Table, Area, …: Bodies that it declares, and where they begin.
     State, World, EpisodeRandom: What its methods are given.
     closeness, stillness, lies_on, …: Terms of rewards and of success.
 
@@ -27,7 +27,7 @@ Writing a task (functions of arrays are in `tasks.maths`):
 
 from robot_layouts.core.own_packages import expect_own
 
-expect_own("robots", "layouts")
+expect_own("robots", "objects", "layouts")
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -58,6 +58,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "Choice",
     "Color",
     "Compound",
+    "ConvexHull",
     "Cube",
     "Cuboid",
     "Cylinder",
@@ -76,6 +77,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "TaskEnv",
     "Needs",
     "Normal",
+    "Object",
     "Peg",
     "PhysicsSettings",
     "Plane",
@@ -96,6 +98,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "WideTable",
     "World",
     "add_goal",
+    "add_object",
     "add_table",
     "add_target",
     "add_wide_table",

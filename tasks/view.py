@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from layouts.viewer import ShownCell, ShownMotion, Thing
 from layouts.visuals import Visual, coloured, load_meshes
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
+from objects.solids import hull_triangles
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
-from robot_layouts.simulation import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from robots import TaskError
 from tasks.engine.env import TaskEnv
 from tasks.native.format import articulation_keys, declared_joints
@@ -110,6 +111,8 @@ def _meshes(shape: Shape) -> list[Any]:
             corners = [(0.0, y, z) for y, z in ((-half, -half), (half, -half), (half, half))]
             corners.append((0.0, -half, half))
             return [trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]])]
+        case ConvexHull():
+            return [trimesh.Trimesh(shape.corners, hull_triangles(shape.corners), process=False)]
         case Mesh():
             meshes = load_meshes(str(shape.file), "a body of the task")
             return [mesh.apply_scale(shape.scale) for mesh in meshes]

@@ -5,10 +5,12 @@ Functions of arrays are in `tasks.maths`, presets of layouts in `layouts`.
 # ruff: noqa: F401
 # pyright: reportUnusedImport=false
 
+from objects.shapes import POLISHED, Color, Finish, linear
 from robot_layouts.simulation import (
     Box,
     Camera,
     Capsule,
+    ConvexHull,
     Cylinder,
     Friction,
     Mesh,
@@ -20,7 +22,6 @@ from robot_layouts.simulation import (
     World,
     add_table,
 )
-from robot_layouts.simulation.scene.shapes import POLISHED, Color, Finish, linear
 from robot_layouts.simulation.state import once_per_state
 from robots.descriptor import Quaternion, Vector3
 from tasks.engine.env import MultiRobotTask, TaskEnv
@@ -33,6 +34,7 @@ from tasks.language.bodies import (
     Cube,
     Cuboid,
     Goal,
+    Object,
     Peg,
     Table,
     Target,
@@ -50,6 +52,7 @@ from tasks.language.props import (
     TARGET_HEIGHT,
     WHITE,
     add_goal,
+    add_object,
     add_target,
     add_wide_table,
 )

@@ -1,11 +1,12 @@
 """The packages of this library, and the folders of them that play episodes."""
 
-PACKAGES = ("robots", "layouts", "tasks", "robot_layouts")
+PACKAGES = ("robots", "objects", "layouts", "tasks", "robot_layouts")
 
 PLAYING = (
     "robot_layouts/core",
     "robot_layouts/kinematics",
     "robots",
+    "objects",
     "layouts",
     "robot_layouts/motion",
     "robot_layouts/simulation",

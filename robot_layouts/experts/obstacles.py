@@ -7,10 +7,10 @@ from functools import lru_cache
 
 import numpy as np
 
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
 from robot_layouts.experts.script import Pose, Scene
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
 from robot_layouts.motion.model.obstacles import Obstacle, box, cylinder, mesh, sphere
-from robot_layouts.simulation.scene.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from robot_layouts.simulation.world import WorldBody
 
 HALF_SPACE = 20.0  # m; edges of the box that stands for what is below a plane
@@ -58,6 +58,8 @@ def _corners(shape: Shape) -> Floats:
             ball = _of(sphere("a ball", shape.radius))
             ends = [ball + (side * shape.half_length, 0.0, 0.0) for side in (-1, 1)]
             return np.concatenate(ends)
+        case ConvexHull():
+            return np.array(shape.corners)
         case Mesh():
             return _of(mesh("a mesh", shape.file, scale=shape.scale))
         case Plane():

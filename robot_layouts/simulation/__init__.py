@@ -6,12 +6,12 @@ The only room that imports sapien, which lives in `sapien3`, below the seam that
 
 from robot_layouts.core.own_packages import expect_own
 
-expect_own("robots", "layouts")
+expect_own("robots", "objects", "layouts")
 
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
 from robot_layouts.simulation.sapien3.world import build_scene
 from robot_layouts.simulation.scene.cameras import Camera
-from robot_layouts.simulation.scene.shapes import Box, Capsule, Cylinder, Mesh, Plane, Shape, Sphere
 from robot_layouts.simulation.simulation import Simulation
 from robot_layouts.simulation.state import State
 from robot_layouts.simulation.tabletop import add_table
@@ -22,6 +22,7 @@ __all__ = [
     "Box",
     "Camera",
     "Capsule",
+    "ConvexHull",
     "Cylinder",
     "Friction",
     "Mesh",

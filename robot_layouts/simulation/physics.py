@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from objects.shapes import Friction
 from robot_layouts.core.bounds import (
     FAR,
     checked_flag,
@@ -37,33 +38,6 @@ _GRAVITY = 1e3  # m/s², along each axis
 _ROUNDING = 1e-6  # of a frequency that was written with seven digits
 _LAST_BITS = 1e-12
 _MOST_SUBSTEPS = 10_000  # of one control step: about a second of computing
-
-
-@dataclass(frozen=True)
-class Friction:
-    """A contact material.
-
-    Attributes:
-        static: Static friction coefficient.
-        dynamic: Dynamic friction coefficient.
-        restitution: Coefficient of restitution, 0 … 1.
-    """
-
-    static: float = 0.3
-    dynamic: float = 0.3
-    restitution: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse what is no coefficient.
-
-        Raises:
-            SimulationError: If one is no number or out of range.
-        """
-        for name, high in (("static", 1e3), ("dynamic", 1e3), ("restitution", 1.0)):
-            value = checked_number(
-                f"friction: {name}", getattr(self, name), 0, high, SimulationError
-            )
-            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)

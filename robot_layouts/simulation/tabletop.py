@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
-from robot_layouts.simulation.scene.shapes import Box, Floor, Mesh, Plane, Shape
+from objects.shapes import Box, Floor, Mesh, Plane, Shape
 from robot_layouts.simulation.world import World
 from robots.assets import scenery
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
+from objects.shapes import Shape, scaled
 from robot_layouts.core.bounds import checked_choice, expect_unit, shown
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
-from robot_layouts.simulation.scene.shapes import Shape, scaled
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
@@ -212,7 +212,7 @@ class World:
             if not isinstance(shape, Shape):
                 raise SimulationError(
                     f"body {name!r}: {shown(shape)} is no shape; shapes are Box, Sphere, Cylinder,"
-                    " Capsule, Mesh and Plane"
+                    " Capsule, ConvexHull, Mesh and Plane"
                 )
         checked_choice(f"body {name!r}: kind", kind, _KINDS, SimulationError)
 

@@ -5,22 +5,25 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from math import cos, isfinite, sin
 from typing import Any, ClassVar, Literal, TypeAlias, TypedDict, TypeVar
 
 from layouts import Layout
-from robot_layouts.core.schema import check_fields
-from robot_layouts.kinematics.quaternions import multiplied
-from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_table
-from robot_layouts.simulation.scene.shapes import (
+from objects import ObjectDescriptor, ObjectRegistry
+from objects.shapes import (
     Color,
     Coordinate,
     Density,
+    Factor,
     Length,
     Lengths,
     Place,
     scaled,
 )
+from robot_layouts.core.schema import check_fields
+from robot_layouts.kinematics.quaternions import multiplied
+from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_table
 from robot_layouts.simulation.tabletop import TABLE_OUTLINE
 from robot_layouts.simulation.world import BodyKind
 from robots import TaskError
@@ -345,6 +348,74 @@ class Compound(Body):
     def height(self) -> float:
         """What ``rest_height`` says (m)."""
         return self.rest_height
+
+
+@dataclass(frozen=True)
+class Object(Body):
+    """A thing of `objects.ObjectRegistry`, lying as it rests.
+
+    Attributes:
+        thing: Its name there, or a descriptor.
+        rest: Which of its ``rests`` it lies in; None for the first.
+        seed: Draws a member of its family; None takes the usual one.
+        scale: Factor on its lengths.
+    """
+
+    thing: ObjectDescriptor | str
+    rest: str | None = field(default=None, kw_only=True)
+    seed: int | None = field(default=None, kw_only=True)
+    scale: Factor = field(default=1.0, kw_only=True)
+    sizes: ClassVar[tuple[str, ...]] = ("scale",)
+
+    def __post_init__(self) -> None:
+        """Refuse what no body can be.
+
+        Raises:
+            TaskError: If a value is of a wrong type or out of bounds.
+            UnknownNameError: If there is no such thing, or it does not rest so.
+            DescriptorError: If a seed is given, and it has no family.
+        """
+        super().__post_init__()
+        self.descriptor.rest(self.rest)
+
+    @property
+    def descriptor(self) -> ObjectDescriptor:
+        """What it is, as large as it is here."""
+        return _loaded(self.thing, self.seed, self.scale)
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Its parts."""
+        return self.descriptor.parts
+
+    @property
+    def height(self) -> float:
+        """Of its origin when it rests on the table (m)."""
+        return self.descriptor.height(self.rest)
+
+    @property
+    def lying(self) -> Quaternion:
+        """How it is turned when it rests."""
+        return self.descriptor.rest(self.rest)
+
+    def add_to(self, world: World, name: str) -> None:
+        """Build it in a world, turned as it rests."""
+        place = (0.0, 0.0, self.height) if self.start is None else self.start
+        world.add(name, *self.shapes, kind=self.kind, position=place, quaternion=self.lying)
+
+
+@lru_cache(maxsize=256)
+def _loaded(thing: ObjectDescriptor | str, seed: int | None, scale: float) -> ObjectDescriptor:
+    if isinstance(thing, ObjectDescriptor):
+        if seed is not None:
+            raise TaskError(
+                f"Object: {thing.name} is given as a descriptor and with seed={seed}; a seed draws"
+                f" a member where the name is given, as in Object({thing.name!r}, seed={seed})"
+            )
+        found = thing
+    else:
+        found = ObjectRegistry.load(thing, seed)
+    return found if scale == 1.0 else found.scaled(scale)
 
 
 @dataclass(frozen=True)

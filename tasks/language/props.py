@@ -7,9 +7,12 @@ from math import cos, pi, sin
 import numpy as np
 
 from layouts import Layout
+from objects import ObjectDescriptor, ObjectRegistry
+from objects.shapes import Color
+from objects.solids import lowest
 from robot_layouts.simulation import Box, Cylinder, Plane, Shape, Sphere, World
-from robot_layouts.simulation.scene.shapes import Color
-from robots.descriptor import Vector3
+from robot_layouts.simulation.world import BodyKind
+from robots.descriptor import Quaternion, Vector3
 
 RED: Color = (1.0, 0.0, 0.0, 1.0)
 GREEN: Color = (0.0, 1.0, 0.0, 1.0)
@@ -99,6 +102,39 @@ def peg_shapes(
         for side, color in ((-1, tail), (1, head))
     ]
     return (solid, *halves)
+
+
+def add_object(
+    world: World,
+    name: str,
+    thing: ObjectDescriptor | str,
+    position: Vector3 = (0.0, 0.0, 0.0),
+    quaternion: Quaternion | None = None,
+    *,
+    seed: int | None = None,
+    kind: BodyKind = "dynamic",
+) -> ObjectDescriptor:
+    """Add a thing of `objects.ObjectRegistry` that lies as it rests, and return what it is.
+
+    Args:
+        world: The world.
+        name: Its name there.
+        thing: Its name in the registry, or a descriptor.
+        position: Where what it lies on is (m): its lowest point is as high.
+        quaternion: How it is turned, wxyz; None as it rests.
+        seed: Draws a member of its family; None takes the usual one.
+        kind: ``"dynamic"`` moves by physics, ``"kinematic"`` by the task, ``"static"`` never.
+
+    Raises:
+        UnknownNameError: If there is no such thing.
+        DescriptorError: If a seed is given, and it has no family.
+    """
+    found = ObjectRegistry.load(thing, seed) if isinstance(thing, str) else thing
+    turned = found.rest() if quaternion is None else quaternion
+    x, y, z = position
+    place = x, y, z - lowest(found.parts, turned)
+    world.add(name, *found.parts, kind=kind, position=place, quaternion=turned)
+    return found
 
 
 def add_target(world: World, radius: float, name: str = "goal_region") -> None:

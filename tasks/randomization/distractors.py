@@ -13,12 +13,12 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from objects.shapes import Capsule
 from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole
 from robot_layouts.simulation import Box, Cylinder, Shape, Simulation, Sphere, State, World
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.scene.looks import Paint
 from robot_layouts.simulation.scene.parts import Part
-from robot_layouts.simulation.scene.shapes import Capsule
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.world import BodyKind, WorldBody
 from robots import TaskError

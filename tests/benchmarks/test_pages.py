@@ -10,9 +10,12 @@ pytest.importorskip("matplotlib")
 
 from benchmarks.__main__ import main
 from benchmarks.experts import TASKS
+from benchmarks.objects import digest_of
 from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
 from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
+from objects import ObjectRegistry
+from objects.registry import CATALOGUE
 from robot_layouts.data.receipts import Receipt
 from robot_layouts.data.receipts.provenance import describe_task
 from tasks import get_task_class
@@ -22,6 +25,7 @@ COMMANDS = {
     "robots": ["robots", "--render"],
     "mjcf": ["mjcfs", "--render"],
     "placing": ["placing"],
+    "objects": ["objects"],
     "experts": ["experts", "--tasks"],
     "conversions": ["conversions", "--modes", "--tasks", "PickCube-v1"],
     "processors": ["processors", "--render"],
@@ -68,6 +72,15 @@ def test_a_record_is_read_as_it_was_written(tmp_path):
     assert read_record(tmp_path / "none.json", tasks={}) == {"tasks": {}}
     with pytest.raises(RecordError, match=r"cannot read .*a\.json: KeyError\('runs'\)"):
         read_record(tmp_path / "a.json", runs={})
+
+
+def test_what_the_page_of_objects_promises():
+    seen = record("objects")["objects"]
+    assert list(seen) == list(CATALOGUE)
+    for name, one in seen.items():
+        assert one["digest"] == digest_of(ObjectRegistry.load(name)), name
+        assert max(one["drift"].values()) < 1.0, name  # mm
+        assert max(held for held, _ in one["grasps"].values()) >= 20, name
 
 
 def test_what_the_page_of_placing_promises():

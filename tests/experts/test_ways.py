@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tasks
+from objects.shapes import Box, Capsule, Cylinder, Plane, Sphere
 from robot_layouts.experts import first_success
 from robot_layouts.experts.geometry import gripper_facing
 from robot_layouts.experts.obstacles import _corners, obstacles
@@ -17,7 +18,6 @@ from robot_layouts.experts.script import CLOSED, Pose, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
 from robot_layouts.experts.ways import NoWayError, Ways
 from robot_layouts.kinematics.rotations import transform
-from robot_layouts.simulation.scene.shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 HALF_PI = np.pi / 2
 MIDDLE = np.array([0.0, 0.0, 0.3])

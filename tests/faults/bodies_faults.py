@@ -49,6 +49,10 @@ def _wrong() -> Iterator[tuple[str, dict[str, Any], str, tuple[Any, ...]]]:
     for field in ("half_length", "half_width"):
         yield "Peg", {"half_length": 0.1, "half_width": 0.01}, field, NO_LENGTH
     yield "Compound", {}, "parts", ((), 5, (None,), "box")
+    yield "Object", {"thing": "mug"}, "scale", NO_LENGTH
+    yield "Object", {"thing": "mug"}, "seed", (2.5, "7", math.nan)
+    yield "Object", {}, "thing", (5, None, "", b"mug", ["mug"])
+    yield "ConvexHull", {}, "corners", (*NO_LENGTHS, ((0.0,) * 3,) * 4, ((0.0,) * 3,) * 70)
     for name, arguments in (("Cube", cube), ("Box", box)):
         yield name, arguments, "density", NO_DENSITY
         yield name, arguments, "color", NO_COLOR
@@ -68,7 +72,7 @@ def _wrong() -> Iterator[tuple[str, dict[str, Any], str, tuple[Any, ...]]]:
 
 
 def _declare(name: str, arguments: dict[str, Any], _: Path) -> None:
-    from robot_layouts.simulation.scene import shapes
+    from objects import shapes
     from robots import RobotLayoutsError
     from tasks.language import bodies
 

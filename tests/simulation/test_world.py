@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement, face_to_face, side_by_side, single
+from objects.shapes import Capsule, Cylinder
 from robot_layouts.simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
 from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.blueprint import read_blueprint
 from robot_layouts.simulation.sapien3.world import BuiltWorld
-from robot_layouts.simulation.scene.shapes import Capsule, Cylinder
 from robot_layouts.simulation.world import WorldBody
 from robots import (
     DescriptorError,

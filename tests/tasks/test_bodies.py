@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import tasks
+from objects.shapes import Finish
 from robot_layouts.simulation import Box, Friction, Sphere
-from robot_layouts.simulation.scene.shapes import Finish
 from robots import SimulationError, TaskError
 from tasks.language.bodies import Area, Ball, Compound, Cube, Cuboid, Peg
 

@@ -21,6 +21,7 @@ from typing_extensions import NotRequired, TypedDict
 
 from layouts import Layout
 from layouts.placement import RobotLike
+from objects.shapes import Friction
 from robot_layouts.core.rooms import PACKAGES
 from robot_layouts.core.schema import FieldError, Finite, Name, Object, check, length, whole
 from robot_layouts.data.actors import EXPERT, POLICY, definition, name_of
@@ -38,7 +39,6 @@ from robot_layouts.data.reading.recorded_task import layout_again, same_places
 from robot_layouts.data.receipts.receipt import EpisodeReceipt, Receipt, ReceiptError
 from robot_layouts.experts.registry import Expert
 from robot_layouts.simulation import Camera, PhysicsSettings
-from robot_layouts.simulation.physics import Friction
 from robots import RobotLayoutsError, UnreadableFileError
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_checksums

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from layouts import Layout
+from objects.shapes import Box
 from robot_layouts.kinematics.rotations import Floats, inverse, rotate
 from robot_layouts.simulation.checks.overlaps import stand
 from robot_layouts.simulation.checks.trial import NAME, RobotAlone
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
-from robot_layouts.simulation.scene.shapes import Box
 from robots.gripper_motion import gripper_motion
 
 CUBE = "cube"  # its name in the world

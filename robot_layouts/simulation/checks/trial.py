@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from layouts import Layout, single
+from objects.shapes import Plane, Shape
 from robot_layouts.simulation.backend import Overlap, Part
 from robot_layouts.simulation.checks.overlaps import empty, stand, starting_overlaps
 from robot_layouts.simulation.maths import Array, Floats
 from robot_layouts.simulation.physics import PhysicsSettings
-from robot_layouts.simulation.scene.shapes import Plane, Shape
 from robot_layouts.simulation.simulation import Simulation
 from robot_layouts.simulation.world import World
 from robots import ActionNumber, RobotDescriptor

@@ -19,9 +19,10 @@ from sapien.render import (
     RenderTexture2D,
 )
 
-from robot_layouts.simulation.scene.shapes import (
+from objects.shapes import (
     Box,
     Capsule,
+    ConvexHull,
     Cylinder,
     Floor,
     Mesh,
@@ -29,6 +30,7 @@ from robot_layouts.simulation.scene.shapes import (
     Shape,
     Sphere,
 )
+from objects.solids import Triangles, hull_triangles
 from robots.descriptor import Vector3
 
 _PLANE_HALF_SIZE = 50.0  # of what is drawn of an infinite plane (m)
@@ -85,6 +87,8 @@ def _visual(shape: Shape) -> Any:
             return RenderShapeCapsule(shape.radius, shape.half_length, _material(shape))
         case Plane():
             return RenderShapePlane([_PLANE_HALF_SIZE] * 3, _material(shape))
+        case ConvexHull():
+            return _hull(shape)
         case Mesh():
             return _mesh(shape)
         case Floor():
@@ -112,6 +116,20 @@ def _mesh(shape: Mesh) -> RenderShapeTriangleMesh:
             for texture in _TEXTURES:
                 getattr(part.material, f"set_{texture}_texture")(None)
     return mesh
+
+
+def _hull(shape: ConvexHull) -> RenderShapeTriangleMesh:
+    """Flat faces: each triangle has corners of its own."""
+    triangles = hull_triangles(shape.corners)
+    normals = Triangles(np.array(shape.corners), triangles).normals
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return RenderShapeTriangleMesh(
+        vertices=np.array(shape.corners)[triangles].reshape(-1, 3),
+        triangles=np.arange(triangles.size).reshape(-1, 3),
+        normals=np.repeat(normals, 3, axis=0),
+        uvs=np.zeros((triangles.size, 2)),
+        material=_material(shape),
+    )
 
 
 def _floor(shape: Floor) -> RenderShapeTriangleMesh:

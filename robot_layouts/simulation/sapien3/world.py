@@ -9,17 +9,17 @@ import sapien
 import sapien.physx as physx
 
 from layouts import Layout
+from objects.shapes import Shape
 from robot_layouts.core.portable import is_portable
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from robot_layouts.simulation.sapien3.blueprint import Blueprint, read_blueprint
-from robot_layouts.simulation.sapien3.collision import add_collision
+from robot_layouts.simulation.sapien3.collision import add_collision, attach_hulls
 from robot_layouts.simulation.sapien3.collision_groups import FLOOR
 from robot_layouts.simulation.sapien3.device import expect_render_device, outlive_forks
 from robot_layouts.simulation.sapien3.exact_division import divide_exactly
 from robot_layouts.simulation.sapien3.robot import SimulatedRobot
 from robot_layouts.simulation.scene.looks import AS_DECLARED
 from robot_layouts.simulation.scene.parts import Part
-from robot_layouts.simulation.scene.shapes import Shape
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.world import World, WorldBody
 from robots import RobotDescriptor, SimulationError
@@ -155,6 +155,7 @@ class BuiltWorld:
             if body.kind == "static"
             else physx.PhysxRigidDynamicComponent
         )
+        attach_hulls(component, body.shapes)
         for shape in component.collision_shapes:
             if isinstance(shape, physx.PhysxCollisionShapePlane):
                 shape.set_collision_groups([*FLOOR, 0, 0])

@@ -1,15 +1,15 @@
-"""Shapes that bodies are made of, as data."""
+"""Shapes that things are made of, as data, and what their surfaces are like."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import hypot
 from pathlib import Path
 from typing import Annotated
 
-from robot_layouts.core.bounds import FAR, expect_unit
+from robot_layouts.core.bounds import FAR, checked_number, expect_unit
+from robot_layouts.core.errors import SimulationError
 from robot_layouts.core.schema import check_fields, within
-from robot_layouts.simulation.physics import Friction
-from robots import SimulationError
 from robots.descriptor import IDENTITY, Quaternion
 
 Fraction = Annotated[float, within(0.0, 1.0)]
@@ -24,6 +24,35 @@ Place = tuple[Coordinate, Coordinate, Coordinate]
 Factor = Annotated[float, within(1e-6, FAR)]
 
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
+FEWEST_CORNERS, MOST_CORNERS = 4, 64  # of a hull; PhysX takes as many on any processor
+THINNEST = 1e-6  # m; of a hull
+
+
+@dataclass(frozen=True)
+class Friction:
+    """A contact material.
+
+    Attributes:
+        static: Static friction coefficient.
+        dynamic: Dynamic friction coefficient.
+        restitution: Coefficient of restitution, 0 … 1.
+    """
+
+    static: float = 0.3
+    dynamic: float = 0.3
+    restitution: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no coefficient.
+
+        Raises:
+            SimulationError: If one is no number or out of range.
+        """
+        for name, high in (("static", 1e3), ("dynamic", 1e3), ("restitution", 1.0)):
+            value = checked_number(
+                f"friction: {name}", getattr(self, name), 0, high, SimulationError
+            )
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True)
@@ -142,6 +171,32 @@ class Capsule(Shape):
 
 
 @dataclass(frozen=True)
+class ConvexHull(Shape):
+    """The convex hull of some points.
+
+    Attributes:
+        corners: The points, 4 to 64 that do not all lie in one plane (m).
+    """
+
+    corners: tuple[Place, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse what no shape can be.
+
+        Raises:
+            SimulationError: If there are fewer corners or more, or they have no volume.
+        """
+        super().__post_init__()
+        if not FEWEST_CORNERS <= len(self.corners) <= MOST_CORNERS:
+            raise SimulationError(
+                f"ConvexHull: corners has {len(self.corners)} entries; it must have"
+                f" {FEWEST_CORNERS} to {MOST_CORNERS}"
+            )
+        if _is_flat(self.corners):
+            raise SimulationError("ConvexHull: corners lie in one plane; a hull needs a volume")
+
+
+@dataclass(frozen=True)
 class Plane(Shape):
     """An infinite plane, such as a floor; its own +x axis is the outward normal.
 
@@ -180,7 +235,7 @@ class Floor(Shape):
     collides: bool = field(default=False, kw_only=True)
 
 
-SIZED = (Box, Sphere, Cylinder, Capsule, Mesh)
+SIZED = (Box, Sphere, Cylinder, Capsule, ConvexHull, Mesh)
 """Shapes that can be larger or smaller."""
 
 
@@ -200,7 +255,39 @@ def scaled(shape: Shape, factor: float) -> Shape:
         case Cylinder() | Capsule():
             radius, half_length = moved.radius * factor, moved.half_length * factor
             return replace(moved, radius=radius, half_length=half_length)
+        case ConvexHull():
+            corners = [[along * factor for along in corner] for corner in moved.corners]
+            return replace(moved, corners=corners)
         case Mesh(scale=(a, b, c)):
             return replace(moved, scale=(a * factor, b * factor, c * factor))
         case _:
             raise SimulationError(f"a {type(shape).__name__} has no size that could be changed")
+
+
+def _is_flat(corners: tuple[Place, ...]) -> bool:
+    """Whether points are all but in one plane, or on one line, or one point."""
+    first = corners[0]
+    ways = [_minus(corner, first) for corner in corners]
+    along = _unit(max(ways, key=lambda way: hypot(*way)))
+    across = _unit(max((_cross(along, way) for way in ways), key=lambda way: hypot(*way)))
+    heights = [sum(a * b for a, b in zip(across, way, strict=True)) for way in ways]
+    beside = _cross(along, across)
+    widths = [sum(a * b for a, b in zip(beside, way, strict=True)) for way in ways]
+    return min(_spread(heights), _spread(widths)) < THINNEST
+
+
+def _spread(values: list[float]) -> float:
+    return max(values) - min(values)
+
+
+def _minus(one: Place, other: Place) -> Place:
+    return (one[0] - other[0], one[1] - other[1], one[2] - other[2])
+
+
+def _cross(a: Place, b: Place) -> Place:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _unit(way: Place) -> Place:
+    length = hypot(*way) or 1.0
+    return (way[0] / length, way[1] / length, way[2] / length)

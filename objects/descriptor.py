@@ -1,0 +1,238 @@
+"""What a thing is: shapes, how it rests, where it is grasped; data that checks itself, no more."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated
+
+from objects.shapes import SIZED, Coordinate, Length, Place, Shape, scaled
+from robot_layouts.core.bounds import checked_number, expect_unit
+from robot_layouts.core.errors import DescriptorError, UnknownNameError
+from robot_layouts.core.schema import check_fields, within
+from robots.descriptor import IDENTITY, Quaternion
+
+Opening = Annotated[float, within(1e-4, 1.0, "m")]
+
+
+@dataclass(frozen=True)
+class NamedPoint:
+    """A point of a thing that tasks speak of, such as its spout.
+
+    Attributes:
+        position: In the thing's frame (m).
+        quaternion: Of a frame there, wxyz; its z axis points away from the thing.
+    """
+
+    position: tuple[Coordinate, Coordinate, Coordinate]
+    quaternion: Quaternion = IDENTITY
+
+    def __post_init__(self) -> None:
+        """Refuse what is no frame."""
+        check_fields(self, DescriptorError)
+        expect_unit("NamedPoint: quaternion", self.quaternion, DescriptorError)
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """A pose of a gripper with two jaws that holds a thing.
+
+    Its frame is that of `robots.gripper_motion`, in which experts speak: z is the way in which the
+    gripper approaches, y the way in which its fingers part.
+
+    Attributes:
+        position: Of the tool centre point in the thing's frame (m).
+        quaternion: Of the gripper's frame in the thing's, wxyz.
+        opening: How far apart the fingers are when they hold it (m).
+        part: What is held, such as ``"handle"``.
+    """
+
+    position: tuple[Coordinate, Coordinate, Coordinate]
+    quaternion: Quaternion
+    opening: Opening
+    part: str = "body"
+
+    def __post_init__(self) -> None:
+        """Refuse what is no grasp."""
+        check_fields(self, DescriptorError)
+        expect_unit("Grasp: quaternion", self.quaternion, DescriptorError)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObjectDescriptor:
+    """Everything the library knows about one thing; frozen, and checked when made.
+
+    Variants are made with `dataclasses.replace` and `scaled`. It is one rigid body.
+
+    Attributes:
+        name: Registry name.
+        about: What it is, in a few words.
+        parts: Its shapes in its own frame; those that collide weigh what their densities say.
+        rests: How it lies on a table: orientation, wxyz, by name; the first is the usual one.
+        source: Where its numbers come from.
+        points: Points of it that tasks speak of, by name.
+        grasps: Where a gripper with two jaws holds it.
+        licence: Of its files or numbers, as SPDX writes it.
+        sizes: The lengths that its family made it with, by name (m).
+        seed: The seed that drew them; None for those of the family itself.
+    """
+
+    name: str
+    about: str
+    parts: tuple[Shape, ...]
+    rests: Mapping[str, Quaternion] = field(default_factory=lambda: {"upright": IDENTITY})
+    source: str
+    points: Mapping[str, NamedPoint] = field(default_factory=dict[str, NamedPoint])
+    grasps: tuple[Grasp, ...] = ()
+    licence: str = "Apache-2.0"
+    sizes: Mapping[str, Length] = field(default_factory=dict[str, Length])
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        """Freeze the mappings and refuse contradictions."""
+        named = isinstance(self.name, str) and self.name.isprintable()
+        check_fields(self, DescriptorError, owner=self.name if named else None)
+        if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) is None:
+            raise DescriptorError(
+                f"object name {self.name!r} must be a letter followed by letters, digits and _"
+            )
+        if not any(part.collides for part in self.parts):
+            raise DescriptorError(
+                f"{self.name}: no part collides; one at least must, so that it has a mass"
+            )
+        for part in self.parts:
+            if not isinstance(part, SIZED):
+                raise DescriptorError(
+                    f"{self.name}: parts holds a {type(part).__name__}, which has no size; parts"
+                    f" are {', '.join(kind.__name__ for kind in SIZED)}"
+                )
+        if not self.rests:
+            raise DescriptorError(f"{self.name}: rests is empty; it lies on a table in some way")
+        for name, quaternion in self.rests.items():
+            expect_unit(f"{self.name}: rests[{name!r}]", quaternion, DescriptorError)
+        for name in ("rests", "points", "sizes"):
+            object.__setattr__(self, name, _FrozenMapping(getattr(self, name)))
+
+    @property
+    def mass(self) -> float:
+        """What it weighs (kg)."""
+        from objects.solids import mass_of
+
+        return mass_of(self.parts).mass
+
+    @property
+    def centre_of_mass(self) -> Place:
+        """Its centre of mass, in its own frame (m)."""
+        from objects.solids import mass_of
+
+        x, y, z = mass_of(self.parts).centre.tolist()
+        return x, y, z
+
+    @property
+    def extent(self) -> Place:
+        """Its lengths along the axes of its own frame (m)."""
+        from objects.solids import bounds
+
+        low, high = bounds(self.parts)
+        x, y, z = (high - low).tolist()
+        return x, y, z
+
+    def rest(self, name: str | None = None) -> Quaternion:
+        """Return how it is turned when it lies on a table, wxyz.
+
+        Args:
+            name: Which of its ``rests``; None takes the first.
+
+        Raises:
+            UnknownNameError: If it does not rest so.
+        """
+        if name is None:
+            return next(iter(self.rests.values()))
+        if name not in self.rests:
+            raise UnknownNameError(f"rest of {self.name}", name, self.rests)
+        return self.rests[name]
+
+    def height(self, rest: str | None = None) -> float:
+        """Return the height of its origin above the table that it lies on (m).
+
+        Args:
+            rest: Which of its ``rests``; None takes the first.
+
+        Raises:
+            UnknownNameError: If it does not rest so.
+        """
+        from objects.solids import lowest
+
+        return round(-lowest(self.parts, self.rest(rest)), 9) + 0.0
+
+    def point(self, name: str) -> NamedPoint:
+        """Return one of its points.
+
+        Raises:
+            UnknownNameError: If it has no such point.
+        """
+        if name not in self.points:
+            raise UnknownNameError(f"point of {self.name}", name, self.points)
+        return self.points[name]
+
+    def grasps_for(self, opening: float, clearance: float = 0.006) -> tuple[Grasp, ...]:
+        """Return the grasps that a gripper opens wide enough for.
+
+        Args:
+            opening: How far its fingers part (m).
+            clearance: By how much wider than what it holds it must open (m).
+        """
+        return tuple(grasp for grasp in self.grasps if grasp.opening + clearance <= opening)
+
+    def scaled(self, factor: float) -> ObjectDescriptor:
+        """Return it larger by a factor, of the same density.
+
+        Raises:
+            DescriptorError: If the factor is not from 0.01 to 100.
+        """
+        times = checked_number(f"{self.name}: scale", factor, 0.01, 100.0, DescriptorError)
+        return replace(
+            self,
+            parts=tuple(scaled(part, times) for part in self.parts),
+            points={
+                name: replace(point, position=_times(point.position, times))
+                for name, point in self.points.items()
+            },
+            grasps=tuple(
+                replace(
+                    grasp,
+                    position=_times(grasp.position, times),
+                    opening=grasp.opening * times,
+                )
+                for grasp in self.grasps
+            ),
+            sizes={name: size * times for name, size in self.sizes.items()},
+        )
+
+    def __repr__(self) -> str:
+        """Show name and counts; the fields are many."""
+        member = "" if self.seed is None else f", seed {self.seed}"
+        counts = f"{len(self.parts)} parts, {len(self.grasps)} grasps"
+        return f"ObjectDescriptor({self.name!r}{member}: {counts})"
+
+
+class _FrozenMapping(dict[str, object]):
+    """A dict that hashes by its items and refuses to change (and still pickles)."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(tuple(self.items()))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return (_FrozenMapping, (dict(self),))
+
+    def _refuse(self, *_: object, **__: object) -> None:
+        raise TypeError("a descriptor is frozen; use dataclasses.replace to change it")
+
+    __setitem__ = __delitem__ = __ior__ = pop = clear = popitem = _refuse  # pyright: ignore
+    update = setdefault = _refuse  # pyright: ignore[reportAssignmentType]
+
+
+def _times(place: Place, factor: float) -> Place:
+    x, y, z = place
+    return x * factor, y * factor, z * factor

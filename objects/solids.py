@@ -1,0 +1,263 @@
+"""Geometry of shapes: volumes, centres, how far they reach, surfaces to draw and to measure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from itertools import combinations
+from math import pi
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Place, Shape, Sphere
+from robot_layouts.core.errors import DescriptorError
+from robot_layouts.kinematics.rotations import Floats, inverse, pose_matrix, rotate, transform
+
+SIDES = 32  # of the polygon that stands for a circle where a surface is wanted
+_SAME_PLANE = 1e-7  # m; corners this near to a plane are in it
+_BOX = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+
+
+class Triangles(NamedTuple):
+    """Triangles of the surface of a convex shape.
+
+    Attributes:
+        corners: In the body's frame, (n, 3) (m).
+        triangles: Three corners each, counter-clockwise seen from outside, (t, 3).
+    """
+
+    corners: Floats
+    triangles: NDArray[np.intp]
+
+    @property
+    def normals(self) -> Floats:
+        """The outward normal of each triangle, as long as twice its area, (t, 3) (m²)."""
+        one, two, three = self.corners[self.triangles].transpose(1, 0, 2)
+        return np.cross(two - one, three - one)
+
+
+class MassProperties(NamedTuple):
+    """What shapes weigh together.
+
+    Attributes:
+        volume: Of all of them, overlaps counted twice, as physics counts them (m³).
+        mass: Likewise (kg).
+        centre: Their centre of mass in the body's frame, (3,) (m).
+    """
+
+    volume: float
+    mass: float
+    centre: Floats
+
+
+def mass_of(shapes: Iterable[Shape]) -> MassProperties:
+    """Return what the shapes of a body that collide weigh together.
+
+    Raises:
+        DescriptorError: If none of them has a volume.
+    """
+    volume, mass, moment = 0.0, 0.0, np.zeros(3)
+    for shape in shapes:
+        if shape.collides:
+            own, centre = _volume(shape)
+            volume, mass = volume + own, mass + own * shape.density
+            moment += own * shape.density * transform(_pose(shape), centre)
+    if not mass:
+        raise DescriptorError("no shape of this body collides, so that it weighs nothing")
+    return MassProperties(volume, mass, moment / mass)
+
+
+def reach(shapes: Iterable[Shape], way: Floats) -> float:
+    """Return how far shapes that collide reach in a direction, from the body's origin (m).
+
+    Args:
+        shapes: In the body's frame.
+        way: The direction in that frame, of length 1, (3,).
+
+    Raises:
+        DescriptorError: If none of them collides.
+    """
+    ways = [_reach(shape, way) for shape in shapes if shape.collides]
+    if not ways:
+        raise DescriptorError("no shape of this body collides, so that it rests on nothing")
+    return max(ways)
+
+
+def lowest(shapes: Iterable[Shape], quaternion: Iterable[float]) -> float:
+    """Return the height of the lowest point of a body that is turned, from its origin (m).
+
+    Args:
+        shapes: In the body's frame.
+        quaternion: How it is turned, wxyz.
+    """
+    down = rotate(inverse(np.array([*quaternion])), np.array([0.0, 0.0, -1.0]))
+    return -reach(shapes, down)
+
+
+def bounds(shapes: Iterable[Shape]) -> tuple[Floats, Floats]:
+    """Return the least and the greatest corner of the box around shapes that collide, (3,) (m)."""
+    parts = tuple(shapes)
+    high = np.array([reach(parts, axis) for axis in np.eye(3)])
+    low = -np.array([reach(parts, -axis) for axis in np.eye(3)])
+    return low, high
+
+
+def surface(shape: Shape) -> Triangles:
+    """Return the surface of a shape in the body's frame; round ones have flat faces.
+
+    Raises:
+        DescriptorError: If it is a plane or a floor, or its file cannot be read.
+    """
+    corners, triangles = _surface(shape)
+    return Triangles(transform(_pose(shape), corners), triangles)
+
+
+def sampled(found: Triangles, count: int, random: np.random.Generator) -> Floats:
+    """Return points on a surface, drawn evenly, (count, 3) (m)."""
+    areas = np.linalg.norm(found.normals, axis=1)
+    chosen = random.choice(len(areas), count, p=areas / areas.sum())
+    first, second = np.sqrt(random.random(count)), random.random(count)
+    shares = np.stack([1 - first, first * (1 - second), first * second], axis=1)
+    return np.einsum("nk,nkj->nj", shares, found.corners[found.triangles[chosen]])
+
+
+@lru_cache(maxsize=4096)
+def hull_triangles(corners: tuple[Place, ...]) -> NDArray[np.intp]:
+    """Return the surface of the convex hull of some points, (t, 3): counter-clockwise triangles.
+
+    Every three points are tried, so that it takes no library and always finds the same ones.
+    """
+    points, places = np.array(corners), {corner: i for i, corner in enumerate(corners)}
+    three = np.array(list(combinations(sorted(places.values()), 3)))  # repeated ones but once
+    one, two, other = points[three].transpose(1, 0, 2)
+    normals = np.cross(two - one, other - one)
+    lengths = np.linalg.norm(normals, axis=1)
+    large = lengths > _SAME_PLANE**2
+    normals, one = normals[large] / lengths[large, None], one[large]
+    heights = points @ normals.T - np.einsum("ij,ij->i", normals, one)
+    single = np.isin(np.arange(len(points)), [*places.values()])
+    outer = (heights <= _SAME_PLANE).all(axis=0)
+    inner = (heights >= -_SAME_PLANE).all(axis=0)
+    faces: dict[tuple[int, ...], Floats] = {}
+    for at in np.flatnonzero(outer | inner):
+        members = tuple(np.flatnonzero((np.abs(heights[:, at]) <= _SAME_PLANE) & single).tolist())
+        faces.setdefault(members, normals[at] if outer[at] else -normals[at])
+    triangles = [
+        (ring[0], ring[i], ring[i + 1])
+        for members, normal in faces.items()
+        for ring in [_ring(points, members, normal)]
+        for i in range(1, len(ring) - 1)
+    ]
+    found = np.array(triangles, np.intp)
+    found.setflags(write=False)
+    return found
+
+
+def _ring(points: Floats, members: tuple[int, ...], normal: Floats) -> list[int]:
+    """Return the corners of the convex hull of points of one plane, counter-clockwise."""
+    along = points[members[1]] - points[members[0]]
+    across = np.asarray(np.cross(normal, along), float)
+    flat: Floats = np.stack([points @ along, points @ across], axis=1)
+    order = sorted(members, key=lambda i: (flat[i][0], flat[i][1]))
+    lower, upper = _chain(flat, order), _chain(flat, order[::-1])
+    return lower[:-1] + upper[:-1]
+
+
+def _chain(flat: Floats, order: list[int]) -> list[int]:
+    """Return the corners that a walk along one side of points has to turn left at."""
+    chain: list[int] = []
+    for i in order:
+        while len(chain) > 1:
+            (ax, ay), (bx, by) = flat[chain[-1]] - flat[chain[-2]], flat[i] - flat[chain[-1]]
+            if ax * by - ay * bx > 0:
+                break
+            chain.pop()
+        chain.append(i)
+    return chain
+
+
+def _pose(shape: Shape) -> Floats:
+    return pose_matrix(np.array(shape.position), np.array(shape.quaternion))
+
+
+def _volume(shape: Shape) -> tuple[float, Floats]:
+    """Return the volume of a shape (m³), and its centre in its own frame, (3,) (m)."""
+    middle = np.zeros(3)
+    match shape:
+        case Box(half_size=(a, b, c)):
+            return 8 * a * b * c, middle
+        case Sphere(radius=r):
+            return 4 / 3 * pi * r**3, middle
+        case Cylinder(radius=r, half_length=h):
+            return 2 * pi * r**2 * h, middle
+        case Capsule(radius=r, half_length=h):
+            return 2 * pi * r**2 * h + 4 / 3 * pi * r**3, middle
+        case _:
+            corners, triangles = _surface(shape)
+            one, two, three = corners[triangles].transpose(1, 0, 2)
+            volumes = np.einsum("ij,ij->i", one, np.cross(two, three)) / 6
+            centres = (one + two + three) / 4
+            return float(volumes.sum()), volumes @ centres / volumes.sum()
+
+
+def _reach(shape: Shape, way: Floats) -> float:
+    """Return how far a shape reaches in a direction of the body's frame (m)."""
+    own, middle = rotate(inverse(np.array(shape.quaternion)), way), way @ np.array(shape.position)
+    aside = float(np.hypot(own[1], own[2]))
+    match shape:
+        case Box():
+            far = np.abs(own) @ np.array(shape.half_size)
+        case Sphere():
+            far = shape.radius
+        case Cylinder():
+            far = shape.half_length * abs(own[0]) + shape.radius * aside
+        case Capsule():
+            far = shape.half_length * abs(own[0]) + shape.radius
+        case _:
+            far = (_surface(shape)[0] @ own).max()
+    return float(middle + far)
+
+
+def _surface(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
+    """Return corners in a shape's own frame, (n, 3) (m), and triangles, (t, 3)."""
+    match shape:
+        case ConvexHull():
+            return np.array(shape.corners), hull_triangles(shape.corners)
+        case Box():
+            return _BOX * shape.half_size, hull_triangles(tuple(map(tuple, _BOX.tolist())))
+        case Mesh():
+            return _file(str(shape.file), shape.scale)
+        case _:
+            return _round(shape)
+
+
+def _round(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
+    import trimesh
+
+    match shape:
+        case Sphere():
+            made = trimesh.creation.icosphere(subdivisions=3, radius=shape.radius)
+        case Cylinder():
+            made = trimesh.creation.cylinder(shape.radius, 2 * shape.half_length, sections=SIDES)
+        case Capsule():
+            count = [SIDES, SIDES]
+            made = trimesh.creation.capsule(2 * shape.half_length, shape.radius, count=count)
+        case _:
+            raise DescriptorError(f"a {type(shape).__name__} has no surface that ends")
+    corners = np.asarray(made.vertices, float)[:, [2, 0, 1]]  # from along z to along x
+    return corners, np.asarray(made.faces, np.intp)
+
+
+@lru_cache(maxsize=64)
+def _file(file: str, scale: Place) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the convex hull of a mesh file, which is what collides of it."""
+    import trimesh
+
+    try:
+        loaded: Any = trimesh.load(file, force="mesh")
+        hull: Any = trimesh.convex.convex_hull(loaded)
+    except Exception as error:  # whatever the reader of this format raises
+        raise DescriptorError(f"{file} cannot be read as a mesh: {error}") from error
+    return np.asarray(hull.vertices, float) * scale, np.asarray(hull.faces, np.intp)

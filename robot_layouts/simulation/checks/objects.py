@@ -1,0 +1,333 @@
+"""Tries things: whether they stand still on a table, and whether grasps of them hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+
+from layouts import Layout, single
+from objects import Grasp, ObjectDescriptor
+from robot_layouts.core.writing import write_whole
+from robot_layouts.kinematics.rotations import (
+    Floats,
+    inverse,
+    inverse_pose,
+    multiply,
+    pose_matrix,
+    quaternion_of,
+    rotate,
+)
+from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
+from robot_layouts.simulation.simulation import Simulation
+from robot_layouts.simulation.tabletop import add_table
+from robot_layouts.simulation.world import World
+from robots import (
+    ActionSplit,
+    Fingers,
+    GripperMaterial,
+    Home,
+    JointGroup,
+    LocalUrdf,
+    RobotDescriptor,
+)
+
+THING, HAND = "thing", "hand"  # their names in a world
+DRIFT, TURN = 1e-3, 0.02  # m and rad; a thing that moves farther does not stand still
+STANDS = 10.0  # s
+OPENINGS = (0.04, 0.07, 0.1)  # m; of the hands that grasps are tried with
+SLIPS, TURNS = 0.02, 0.75  # m, how wide the pads are, and rad; what moves farther is not held
+
+_FREQUENCY = 100.0  # Hz
+_AJAR = 4e-3  # m; between each finger and what it is to hold, before it closes
+_CLOSING, _HOLDING, _SHAKING = 80, 20, 60  # steps; the last along each axis
+_SWAY, _PERIOD = 0.0125, 20  # m to both sides, and steps: 12 m/s²
+_WEIGHTLESS = replace(SAPIEN_DEFAULTS, gravity=(0.0, 0.0, 0.0))
+_PAD, _TIP, _ROOT = (0.02, 0.01), 0.01, -0.045  # m; of fingers: section, and ends along z
+_SQUEEZE = 0.05  # m by which fingers are driven beyond each other
+_LEAST, _PER_MASS = 8.0, 70.0  # N and N/kg: how hard jaws press
+
+
+class RestTrial(NamedTuple):
+    """What was seen of a thing that was put on a table.
+
+    Attributes:
+        name: The thing.
+        rest: How it was put there.
+        drift: How far it moved (m).
+        sank: How much of that was down (m).
+        turned: By how much it turned (rad).
+    """
+
+    name: str
+    rest: str
+    drift: float
+    sank: float
+    turned: float
+
+    @property
+    def problem(self) -> str | None:
+        """What is wrong, or None."""
+        if self.drift < DRIFT and self.turned < TURN:
+            return None
+        return (
+            f"{self.name}, put down {self.rest}, moves by {self.drift * 1e3:.2g} mm (down by"
+            f" {self.sank * 1e3:.2g} mm) and turns by {self.turned:.2g} rad in {STANDS:g} s"
+        )
+
+
+class TriedGrasp(NamedTuple):
+    """What was seen of a grasp.
+
+    Attributes:
+        grasp: The grasp.
+        grasped: Whether both fingers still pressed on the thing after the shake.
+        slipped: How far what is held moved in the hand meanwhile (m).
+        turned: By how much the thing turned in the hand (rad).
+    """
+
+    grasp: Grasp
+    grasped: bool
+    slipped: float
+    turned: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the thing stayed in the hand."""
+        return self.grasped and self.slipped < SLIPS and self.turned < TURNS
+
+
+def try_rests(things: Iterable[ObjectDescriptor], time: float = STANDS) -> list[RestTrial]:
+    """Put things on a table in all the ways in which they rest, and watch them.
+
+    Args:
+        things: The things.
+        time: For how long (s).
+
+    Raises:
+        RobotLayoutsError: If one cannot be built.
+    """
+    cases = [(thing, rest) for thing in things for rest in thing.rests]
+
+    def build(world: World, number: int) -> None:
+        add_table(world, textured=False)
+        thing, rest = cases[number]
+        place = (0.0, 0.0, thing.height(rest))
+        world.add(THING, *thing.parts, position=place, quaternion=thing.rest(rest))
+
+    with TemporaryDirectory() as folder:
+        away = Home(position=(0.0, 0.0, 3.0))
+        hand = replace(two_jaw_hand(max(OPENINGS), Path(folder)), home=away)
+        simulation = _stood(single({HAND: hand}), build, len(cases))
+        before = simulation.read().pose(THING).astype(float)
+        for _ in range(round(time * 20)):
+            simulation.coast(range(len(cases)))
+        after = simulation.read().pose(THING).astype(float)
+    moved = after[:, :3] - before[:, :3]
+    return [
+        RestTrial(
+            thing.name,
+            rest,
+            float(np.linalg.norm(way)),
+            float(-way[2]),
+            _angle(one[3:], other[3:]),
+        )
+        for (thing, rest), way, one, other in zip(cases, moved, before, after, strict=True)
+    ]
+
+
+def try_thing_grasps(
+    thing: ObjectDescriptor, opening: float, grasps: Sequence[Grasp] | None = None
+) -> list[TriedGrasp]:
+    """Grasp a thing with a flying hand of two jaws, and shake it along every axis.
+
+    Nothing has weight; the shake is stronger than that.
+
+    Args:
+        thing: The thing.
+        opening: How far the hand opens (m).
+        grasps: Which grasps; None takes all that the hand opens wide enough for.
+
+    Raises:
+        RobotLayoutsError: If it cannot be built.
+    """
+    tried = thing.grasps_for(opening) if grasps is None else tuple(grasps)
+    if not tried:
+        return []
+    with TemporaryDirectory() as folder:
+        hand = two_jaw_hand(opening, Path(folder), _LEAST + _PER_MASS * thing.mass)
+        return _shaken(thing, hand, tried)
+
+
+def _shaken(
+    thing: ObjectDescriptor, hand: RobotDescriptor, grasps: Sequence[Grasp]
+) -> list[TriedGrasp]:
+    poses = [inverse_pose(pose_matrix(grasp.position, grasp.quaternion)) for grasp in grasps]
+
+    def build(world: World, number: int) -> None:
+        place, turned = poses[number][:3, 3].tolist(), quaternion_of(poses[number][:3, :3])
+        world.add(THING, *thing.parts, position=place, quaternion=tuple(turned.tolist()))
+
+    layout, count = single({HAND: hand}), len(grasps)
+    simulation = _stood(layout, build, count, weightless=True)
+    for world, grasp in zip(simulation.worlds, grasps, strict=True):
+        ajar = grasp.opening / 2 + _AJAR
+        world.stand(HAND, [0.0, 0.0, 0.0, ajar, ajar])
+    places = np.array([grasp.position for grasp in grasps])
+    action = np.zeros((count, layout.action_dim), np.float32)
+    wide = np.array([2 * (grasp.opening / 2 + _AJAR + _SQUEEZE) for grasp in grasps])
+    ajar = wide / (layout[HAND].robot.keyframes["rest"][-1] + _SQUEEZE) - 1
+    held = None
+    for step in range(_CLOSING + _HOLDING + 3 * _SHAKING):
+        axis, at = divmod(step - _CLOSING - _HOLDING, _SHAKING)
+        action[:, :3], closed = 0.0, min(step / _CLOSING, 1.0)
+        action[:, -1] = ajar + closed * (-1.0 - ajar)
+        if axis >= 0:
+            action[:, axis] = np.sin(2 * np.pi * at / _PERIOD)
+        simulation.step(action, simulation.read().joint_positions)
+        if step == _CLOSING + _HOLDING - 1:
+            held = _in_hand(simulation, places)
+    assert held is not None
+    end = _in_hand(simulation, places)
+    grasped = simulation.read().is_grasping(HAND, THING)
+    return [
+        TriedGrasp(
+            grasp,
+            bool(grasped[i]),
+            float(np.linalg.norm(end[0][i] - held[0][i])),
+            _angle(held[1][i], end[1][i]),
+        )
+        for i, grasp in enumerate(grasps)
+    ]
+
+
+def _stood(
+    layout: Layout,
+    build: Callable[[World, int], None],
+    count: int,
+    *,
+    weightless: bool = False,
+) -> Simulation:
+    """Return worlds with a hand that stands at its start."""
+    physics = _WEIGHTLESS if weightless else SAPIEN_DEFAULTS
+    frequency = _FREQUENCY if weightless else 20.0
+    simulation = Simulation(layout, build, count, physics, control_frequency=frequency)
+    simulation.clear(range(count))
+    for world in simulation.worlds:
+        world.stand(HAND, layout[HAND].start_qpos)
+    simulation.rest(simulation.read(), range(count))
+    return simulation
+
+
+def _in_hand(simulation: Simulation, places: Floats) -> tuple[Floats, Floats]:
+    """Return where points of the things are in the hand, (N, 3) (m), and how they are turned."""
+    state = simulation.read()
+    hand, thing = state.link_pose(HAND, "palm").astype(float), state.pose(THING).astype(float)
+    points = np.array(
+        [
+            rotate(inverse(h[3:]), t[:3] + rotate(t[3:], place) - h[:3])
+            for h, t, place in zip(hand, thing, places, strict=True)
+        ]
+    )
+    turned = [multiply(inverse(h[3:]), t[3:]) for h, t in zip(hand, thing, strict=True)]
+    return points, np.array(turned)
+
+
+def _angle(one: Floats, other: Floats) -> float:
+    """Return the angle between two orientations, wxyz (rad)."""
+    turn = multiply(inverse(one), other)
+    return float(2 * np.arctan2(np.linalg.norm(turn[1:]), abs(turn[0])))
+
+
+def two_jaw_hand(opening: float, folder: Path, force: float = _LEAST) -> RobotDescriptor:
+    """Return a hand with two jaws that flies along three axes; its URDF is written.
+
+    Its frame is that of `robots.gripper_motion`, with the origin between its pads.
+
+    Args:
+        opening: How far the jaws part (m).
+        folder: Where to write the URDF.
+        force: With which each jaw presses (N).
+
+    Raises:
+        UnwritableFileError: If it cannot be written.
+    """
+    path = folder / f"hand_{opening * 1e3:.0f}.urdf"
+    write_whole(path, _hand_urdf(opening))
+    slides, jaws = ("slide_x", "slide_y", "slide_z"), ("left", "right")
+    return RobotDescriptor(
+        name="two_jaw_hand",
+        urdf=LocalUrdf(path),
+        action_split=ActionSplit(
+            arm=JointGroup(
+                slides,
+                lower=-_SWAY,
+                upper=_SWAY,
+                stiffness=1e5,
+                damping=2e2,
+                force_limit=1e4,
+                unit="m",
+                reset_noise=False,
+                limits=((-1.0, 1.0),) * 3,
+            ),
+            gripper=JointGroup(
+                jaws,
+                mimic=True,
+                lower=-_SQUEEZE,
+                upper=opening / 2,
+                stiffness=4e3,
+                damping=1e2,
+                force_limit=force,
+                unit="m",
+                reset_noise=False,
+                limits=((-_SQUEEZE, opening / 2),) * 2,
+            ),
+        ),
+        tcp_link="palm",
+        keyframes={"rest": (0.0, 0.0, 0.0, opening / 2, opening / 2)},
+        fingers=Fingers(("left_jaw", "right_jaw")),
+        gripper_material=GripperMaterial(("left_jaw", "right_jaw"), 1.0, 1.0),
+        reach=1.0,
+        source="robot_layouts.simulation.checks.objects",
+    )
+
+
+def _hand_urdf(opening: float) -> str:
+    x, y = _PAD
+    middle, long = (_TIP + _ROOT) / 2, _TIP - _ROOT
+    parts = [_link("base", 1.0)]
+    parent = "base"
+    for axis, child in (("x", "carriage_x"), ("y", "carriage_y"), ("z", "palm")):
+        way = " ".join("1" if axis == other else "0" for other in "xyz")
+        parts.append(_joint(f"slide_{axis}", parent, child, way, -1.0, 1.0))
+        palm = (0.05, opening + 0.06, 0.02), (0.0, 0.0, _ROOT - 0.01)
+        parts.append(_link(child, 0.3, *(palm if child == "palm" else ())))
+        parent = child
+    for jaw, side in (("left", 1), ("right", -1)):
+        parts.append(_joint(jaw, "palm", f"{jaw}_jaw", f"0 {side} 0", -_SQUEEZE, opening / 2))
+        parts.append(_link(f"{jaw}_jaw", 0.1, (x, y, long), (0.0, side * y / 2, middle)))
+    return f'<robot name="two_jaw_hand">{"".join(parts)}</robot>'
+
+
+def _link(name: str, mass: float, size: Sequence[float] = (), place: Sequence[float] = ()) -> str:
+    spin = mass * 1e-3  # kg·m²
+    inertia = f'ixx="{spin}" iyy="{spin}" izz="{spin}" ixy="0" ixz="0" iyz="0"'
+    inertial = f'<inertial><mass value="{mass}"/><inertia {inertia}/></inertial>'
+    collision = ""
+    if size:
+        shape = f'<geometry><box size="{" ".join(map(str, size))}"/></geometry>'
+        collision = f'<collision><origin xyz="{" ".join(map(str, place))}"/>{shape}</collision>'
+    return f'<link name="{name}">{inertial}{collision}</link>'
+
+
+def _joint(name: str, parent: str, child: str, axis: str, low: float, high: float) -> str:
+    mimic = '<mimic joint="left"/>' if name == "right" else ""  # so that they close evenly
+    limit = f'<limit lower="{low}" upper="{high}" effort="10000" velocity="10"/>'
+    return (
+        f'<joint name="{name}" type="prismatic"><parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="{axis}"/>{limit}{mimic}</joint>'
+    )

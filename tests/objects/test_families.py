@@ -1,0 +1,155 @@
+"""Families: every one of them, their members by seed, and what fits together."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from objects import ObjectDescriptor, ObjectRegistry
+from objects.registry import CATALOGUE
+from objects.shapes import Cylinder
+from objects.solids import bounds, surface
+from robot_layouts.kinematics.rotations import rotation_of
+from robots import DescriptorError, UnknownNameError
+from tests.checkout import ROOT
+
+SEEDS = range(5)
+FEWEST_GRASPS = 20
+
+PRINT = """
+from hashlib import sha256
+from objects import ObjectRegistry
+for name in ObjectRegistry.names():
+    for seed in (None, *range(3)):
+        d = ObjectRegistry.load(name, seed)
+        text = repr((d.name, d.parts, d.rests, d.points, d.grasps, d.sizes, d.seed))
+        print(name, seed, sha256(text.encode()).hexdigest())
+"""
+
+
+def members(name: str) -> list[ObjectDescriptor]:
+    return [ObjectRegistry.load(name, seed) for seed in (None, *SEEDS)]
+
+
+def test_there_are_twenty_families_at_least_and_each_is_called_as_its_function():
+    assert len(CATALOGUE) >= 20
+    assert list(CATALOGUE) == sorted(CATALOGUE)
+    for name in CATALOGUE:
+        family = ObjectRegistry.family(name)
+        assert family.name == name
+        assert family.about
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_members_are_sound(name):
+    for member in members(name):
+        assert 0.005 < member.mass < 5.0
+        assert all(0.01 < length < 0.8 for length in member.extent)
+        assert len(member.grasps) >= FEWEST_GRASPS
+        assert len(set(member.grasps)) == len(member.grasps)
+        assert member.points
+        assert all(np.isfinite(member.height(rest)) for rest in member.rests)
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_a_seed_gives_one_member_between_the_bounds_and_another_seed_another(name):
+    family = ObjectRegistry.family(name)
+    assert family.member(3) == family.member(3)
+    assert family.member(3) != family.member(4)
+    assert family.usual == family() == ObjectRegistry.load(name)
+    for member in members(name):
+        assert family(**member.sizes).parts == member.parts
+        for length, (_, low, high) in family.sizes.items():
+            assert low <= member.sizes[length] <= high
+
+
+def test_two_processes_make_the_same_bytes():
+    runs = [
+        subprocess.run(
+            [sys.executable, "-c", PRINT],
+            env={**os.environ, "PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2")
+    ]
+    assert runs[0] == runs[1]
+    assert len(set(runs[0].split("\n"))) == 4 * len(CATALOGUE) + 1
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_fingers_close_on_the_surface_where_a_grasp_says(name):
+    """Along the way in which the fingers close, what is held is as wide as the opening."""
+    for member in members(name)[:2]:
+        surfaces = [surface(part) for part in member.parts]
+        for grasp in member.grasps:
+            frame = rotation_of(np.array(grasp.quaternion))
+            assert np.allclose(frame.T @ frame, np.eye(3), atol=1e-6)
+            spans = [span for s in surfaces if (span := _span(s, grasp.position, frame))]
+            half = grasp.opening / 2
+            held = [span for span in spans if span[0] < half and span[1] > -half]
+            low, high = min(s[0] for s in held), max(s[1] for s in held)
+            assert high - low == pytest.approx(grasp.opening, abs=1.5e-3), grasp
+            assert high == pytest.approx(-low, abs=1.5e-3), grasp
+
+
+def _span(surface, position, frame):
+    """Where the line along which fingers close goes through a convex surface: from, to (m)."""
+    one, *_ = surface.corners[surface.triangles].transpose(1, 0, 2)
+    normals = surface.normals
+    ahead = normals @ frame[:, 1]
+    away = np.einsum("ij,ij->i", normals, one - np.array(position))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = away / ahead
+    low = max(at[ahead < -1e-12], default=-np.inf)
+    high = min(at[ahead > 1e-12], default=np.inf)
+    outside = (away[np.abs(ahead) <= 1e-12] < -1e-12).any()
+    return None if outside or low >= high else (low, high)
+
+
+@pytest.mark.parametrize("seed", [None, *SEEDS])
+def test_what_is_made_for_each_other_fits(seed):
+    def load(name):
+        return ObjectRegistry.load(name, seed)
+
+    peg, socket = load("peg"), load("socket")
+    assert peg.sizes == socket.sizes
+    inner = 2 * min(abs(part.position[0]) - part.half_size[0] for part in socket.parts[3:])
+    assert 0.001 < inner - peg.sizes["side"] < 0.005
+    for inside, outside in (("bolt", "nut"), ("shaft", "gear"), ("bottle", "bottle_cap")):
+        one, other = load(inside), load(outside)
+        assert one.sizes == other.sizes
+        (pin,) = [p for p in one.parts if isinstance(p, Cylinder)][-1:]
+        wedges = [part for part in other.parts if _is_wedge(part)]
+        clear = min(np.hypot(*_hole_side(wedge)) for wedge in wedges) - pin.radius
+        assert 0.0003 < clear < 0.003, inside
+    box, lid = load("box"), load("box_lid")
+    assert (np.array(lid.extent)[:2] > np.array(box.extent)[:2]).all()
+    plug, outlet = load("plug"), load("outlet")
+    assert plug.points["tip"].position[2] == outlet.points["holes"].position[2]
+    low, high = bounds(load("pot_two_handles").parts)
+    assert load("pot_lid").sizes["radius"] < high[1] + 1e-6
+
+
+def _is_wedge(part):
+    return type(part).__name__ == "ConvexHull" and len(part.corners) == 8
+
+
+def _hole_side(part):
+    """The point of a wedge's inner side that is nearest to the axis, (2,) (m)."""
+    inner = sorted(part.corners, key=lambda corner: np.hypot(*corner[:2]))[:4]
+    return np.mean(inner, axis=0)[:2]
+
+
+def test_a_length_that_the_family_does_not_have_is_named_with_the_closest():
+    mug = ObjectRegistry.family("mug")
+    with pytest.raises(UnknownNameError, match="unknown length of mug 'radios'. Did you mean 'rad"):
+        mug(radios=0.04)
+    with pytest.raises(DescriptorError, match="mug: radius is 0.2; it must be a number from 0.034"):
+        mug(radius=0.2)
+    with pytest.raises(DescriptorError, match="mug: seed is -1; it must be an integer of 0"):
+        mug.member(-1)
+    assert mug(radius=0.04).sizes["radius"] == 0.04

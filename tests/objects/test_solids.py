@@ -1,0 +1,107 @@
+"""Geometry of shapes: volumes, reach, surfaces."""
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull as QhullsHull
+
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Sphere, scaled
+from objects.solids import bounds, hull_triangles, lowest, mass_of, reach, sampled, surface
+from robot_layouts.kinematics.quaternions import normalised
+from robots import DescriptorError, SimulationError
+
+TURNED = normalised((0.8, 0.1, -0.4, 0.3))
+CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+SHAPES = (
+    Box((0.1, 0.2, 0.3), position=(1.0, 2.0, 3.0), quaternion=TURNED),
+    Sphere(0.2, position=(0.1, 0.0, 0.0)),
+    Cylinder(0.1, 0.3, quaternion=TURNED),
+    Capsule(0.1, 0.3, position=(0.0, 0.5, 0.0), quaternion=TURNED),
+    ConvexHull(CORNERS, quaternion=TURNED),
+)
+
+
+@pytest.mark.parametrize(
+    ("corners", "message"),
+    [
+        (CORNERS[:3], "ConvexHull: corners has 3 entries; it must have 4 to 64"),
+        (CORNERS * 17, "ConvexHull: corners has 68 entries"),
+        ((*CORNERS[:3], (1, 1, 0)), "ConvexHull: corners lie in one plane"),
+        (((0, 0, 0), (1, 1, 1), (2, 2, 2), (3, 3, 3)), "ConvexHull: corners lie in one plane"),
+        (((1, 1, 1),) * 4, "ConvexHull: corners lie in one plane"),
+        ((*CORNERS[:3], (0, 0, math.nan)), r"ConvexHull: corners\[3\]\[2\] is nan"),
+    ],
+)
+def test_what_has_no_volume_is_no_hull(corners, message):
+    with pytest.raises(SimulationError, match=f"^{message}"):
+        ConvexHull(corners)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_surface_of_a_hull_is_closed_faces_outwards_and_has_the_volume_that_qhull_finds(seed):
+    points = np.random.default_rng(seed).normal(size=(8 + 2 * seed, 3))
+    if seed % 2:
+        points = points.round(0)  # corners of one plane, edges with points on them, repeated ones
+    corners = tuple(map(tuple, points.tolist()))
+    triangles = hull_triangles(corners)
+    ways = Counter((t[i], t[(i + 1) % 3]) for t in triangles.tolist() for i in range(3))
+    places = {corner: tuple(corners[corner]) for way in ways for corner in way}
+    edges = Counter((places[a], places[b]) for a, b in ways.elements())
+    assert all(edges[a, b] == edges[b, a] for a, b in edges)
+    assert mass_of([ConvexHull(corners)]).volume == pytest.approx(QhullsHull(points).volume)
+
+
+@pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
+def test_a_surface_reaches_as_far_as_its_shape_and_holds_nearly_its_volume(shape):
+    found = surface(shape)
+    for way in np.random.default_rng(0).normal(size=(20, 3)):
+        way /= np.linalg.norm(way)
+        assert (found.corners @ way).max() == pytest.approx(reach([shape], way), abs=0.005)
+    one, two, three = found.corners[found.triangles].transpose(1, 0, 2)
+    volume = np.einsum("ij,ij->", one, np.cross(two, three)) / 6
+    assert volume == pytest.approx(mass_of([shape]).volume, rel=0.03)
+    points = sampled(found, 200, np.random.default_rng(1))
+    ways = found.normals / np.linalg.norm(found.normals, axis=1, keepdims=True)
+    heights = np.einsum("nti,ti->nt", points[:, None] - one, ways)
+    assert np.abs(heights.max(axis=1)).max() < 1e-9
+
+
+def test_the_centre_of_a_tetrahedron_is_the_mean_of_its_corners():
+    assert mass_of([ConvexHull(CORNERS)]).centre == pytest.approx([0.25, 0.25, 0.25])
+    assert mass_of([ConvexHull(CORNERS)]).mass == pytest.approx(1000 / 6)
+
+
+def test_bounds_and_the_lowest_point_count_what_collides():
+    shapes = (Box((0.1, 0.2, 0.3)), Sphere(9.0, collides=False))
+    low, high = bounds(shapes)
+    assert low == pytest.approx([-0.1, -0.2, -0.3])
+    assert high == pytest.approx([0.1, 0.2, 0.3])
+    quarter = math.sqrt(0.5)
+    assert lowest(shapes, (quarter, quarter, 0.0, 0.0)) == pytest.approx(-0.2)
+
+
+def test_a_scaled_hull_is_larger():
+    hull = ConvexHull(CORNERS, position=(1.0, 0.0, 0.0))
+    assert mass_of([scaled(hull, 2.0)]).volume == pytest.approx(8 * mass_of([hull]).volume)
+    assert scaled(hull, 2.0).position == (2.0, 0.0, 0.0)
+
+
+def test_a_mesh_counts_as_its_convex_hull(tmp_path):
+    import trimesh
+
+    trimesh.creation.annulus(0.1, 0.2, 0.3).export(tmp_path / "ring.stl")
+    found = mass_of([Mesh(tmp_path / "ring.stl", scale=(2.0, 2.0, 2.0))])
+    assert found.volume == pytest.approx(8 * math.pi * 0.2**2 * 0.3, rel=0.02)
+
+
+def test_what_never_ends_has_no_surface(tmp_path):
+    with pytest.raises(DescriptorError, match="a Plane has no surface that ends"):
+        surface(Plane())
+    with pytest.raises(DescriptorError, match=r"gone.stl cannot be read as a mesh"):
+        surface(Mesh(tmp_path / "gone.stl"))
+    with pytest.raises(DescriptorError, match="no shape of this body collides, so that it weighs"):
+        mass_of([Box((1, 1, 1), collides=False)])
+    with pytest.raises(DescriptorError, match="no shape of this body collides, so that it rests"):
+        lowest([], (1.0, 0.0, 0.0, 0.0))
