@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -28,11 +28,11 @@ from benchmarks.records import (
     write_page,
     write_record,
 )
-from layouts import Layout, ring, search
+from layouts import Layout, face_to_face, ring, search
 from layouts.frames import Frame
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.touching import ArmWatch
-from robots import LayoutError, TaskError
+from robots import LayoutError, RobotLayoutsError, TaskError
 from tasks import TaskEnv, get_task_class, make
 from tasks.episode import play
 
@@ -116,6 +116,10 @@ CELLS = {
 }
 TASKS = (*CELLS, "Relay-v1")
 
+HAND_OVER = "TwoRobotHandOver-v1"
+HANDS = ("panda", "panda_pinch", "so100", "so101", "koch", "z1", "fetch")
+PAIRS = tuple(dict.fromkeys(pair for hand in HANDS for pair in ((hand, hand), ("panda", hand))))
+
 
 def experts(
     *,
@@ -123,6 +127,7 @@ def experts(
     seeds: int = 100,
     layouts: int = 10,
     layout_seeds: int = 10,
+    pair_seeds: int = 10,
     out: Path = DOCS / "experts.json",
 ) -> int:
     """Let experts of tasks for several robots play in their own layouts and in others.
@@ -132,22 +137,31 @@ def experts(
         seeds: In its own layout; those in the record are not played again.
         layouts: Other layouts.
         layout_seeds: In each of them.
+        pair_seeds: Of the hand-over by each pair of robots, face to face.
         out: The record, written after every episode; the page is beside it.
 
     Raises:
         RobotLayoutsError: If something cannot be made, read or written.
     """
     torch.set_num_threads(1)
-    record = read_record(out, versions={}, tasks={})
-    with tqdm(total=len(tasks) * (seeds + layouts * layout_seeds), disable=None) as bar:
-        for _ in _played(record, tasks, seeds, layouts, layout_seeds):
+    record = read_record(out, versions={}, tasks={}, pairs={})
+    total = len(tasks) * (seeds + layouts * layout_seeds) + len(PAIRS) * pair_seeds
+    with tqdm(total=total, disable=None) as bar:
+        for _ in chain(
+            _played(record, tasks, seeds, layouts, layout_seeds),
+            _handed_over(record["pairs"], pair_seeds),
+        ):
             record["versions"] |= versions_of("sapien", "ompl", "python-fcl")
             write_record(out, record)
             bar.update()
     shown = sorted(record["tasks"].items())
     rows = [row for task_id, seen in shown for row in _rows(task_id, seen)]
     failures = [line for task_id, seen in shown for line in _failures(task_id, seen)]
-    write_page(out, "experts", versions=record["versions"], rows=rows, failures=failures)
+    pairs = [[name, *_row([*seen["episodes"].values()])] for name, seen in record["pairs"].items()]
+    failures += [line for name, seen in record["pairs"].items() for line in _lacking(name, seen)]
+    write_page(
+        out, "experts", versions=record["versions"], rows=rows, pairs=pairs, failures=failures
+    )
     return 0
 
 
@@ -169,6 +183,21 @@ def _played(
             if "layout" in (other := others[str(number)]):
                 task = make(task_id, layout=Layout.from_yaml(other["layout"]), obs_mode="none")
                 yield from _play(task, other["episodes"], layout_seeds)
+
+
+def _handed_over(pairs: Record, seeds: int) -> Iterator[None]:
+    """Play what the record of pairs lacks, and yield after every episode."""
+    for left, right in PAIRS:
+        seen = pairs.setdefault(f"{left}, {right}", {"episodes": {}})
+        if len(seen["episodes"]) >= seeds or "error" in seen:
+            continue
+        layout = face_to_face({"left": left, "right": right})
+        try:
+            task = make(HAND_OVER, layout=layout, obs_mode="none")
+        except RobotLayoutsError as error:
+            seen["error"] = str(error).partition("\n")[0].rstrip(":")
+        else:
+            yield from _play(task, seen["episodes"], seeds)
 
 
 def _play(task: TaskEnv, episodes: Record, seeds: int) -> Iterator[None]:
@@ -265,6 +294,14 @@ def _row(episodes: Sequence[Record]) -> list[str]:
         str(sum(bool(episode["touching"]) for episode in episodes)),
         f"{median(episode['steps'] for episode in solved):.0f}" if solved else "–",
     ]
+
+
+def _lacking(pair: str, seen: Record) -> Iterator[str]:
+    """Yield why a pair does not hand over."""
+    reasons = Counter(e["reason"] for e in seen["episodes"].values() if not e["success"])
+    yield from (f"- {HAND_OVER} by {pair}: {n} × {why}" for why, n in reasons.items())
+    if "error" in seen:
+        yield f"- {HAND_OVER} by {pair}: {seen['error']}"
 
 
 def _failures(task_id: str, seen: Record) -> Iterator[str]:

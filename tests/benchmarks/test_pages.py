@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from benchmarks.__main__ import main
-from benchmarks.experts import TASKS
+from benchmarks.experts import PAIRS, TASKS
 from benchmarks.objects import digest_of
 from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
@@ -102,6 +102,15 @@ def test_what_the_page_of_experts_promises():
         assert sum(episode["success"] for episode in own) >= 0.98 * len(own), task_id
         assert sum(episode["success"] for episode in elsewhere) >= 0.95 * len(elsewhere), task_id
         assert not any(episode["touching"] for episode in own + elsewhere), task_id
+
+
+def test_what_the_page_of_experts_promises_of_pairs():
+    pairs = record("experts")["pairs"]
+    assert list(pairs) == [f"{left}, {right}" for left, right in PAIRS]
+    for hand in ("panda", "so100", "so101"):
+        episodes = pairs[f"{hand}, {hand}"]["episodes"].values()
+        assert sum(episode["success"] for episode in episodes) >= 8, hand
+        assert not any(episode["touching"] for episode in episodes), hand
 
 
 def test_nothing_portable_differs():
