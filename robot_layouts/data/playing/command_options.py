@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from robot_layouts.core.cli import Word, at_least
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, check_timeout
@@ -75,15 +75,20 @@ class Acting:
 
     Attributes:
         policy: A policy that can be imported; by default the task's expert.
-        obs_mode: What policies observe: state, state_dict, rgb and others.
+        obs_mode: What policies observe: state, state_dict, rgb and others (state).
         camera_size: Width and height in pixels of the pictures observed (each camera's own).
         control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
     """
 
     policy: Policy = "expert"
-    obs_mode: Annotated[str, Word("MODE")] = "state"
+    obs_mode: Annotated[str, Word("MODE")] | None = None
     camera_size: PictureSize | None = None
     control_mode: ControlMode | None = None
+
+    def playing(self) -> dict[str, Any]:
+        """Return these options as arguments of what plays."""
+        given = vars(self)
+        return {name: value for name, value in given.items() if (name, value) != ("obs_mode", None)}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -68,6 +68,7 @@ ARRAYS = (
 TEXTS = ("action_split", "episode")
 OBSERVATIONS = "obs"  # an array, or a group of some
 OBSERVED = "obs_checksum"  # the same of these, which are not read with an episode
+ORDER = "order"  # of all arrays, where some are observations
 
 # What may change from one resumption to the next, and what earlier versions did not write.
 NOT_COMPARED = ("source_type", "source_desc", "guessed", FILE_NUMBER)
@@ -236,6 +237,19 @@ def checksums(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]])
     if any(name.partition("/")[0] == OBSERVATIONS for name in arrays):
         found[OBSERVED] = observed_checksum(arrays)
     return found
+
+
+def in_order(
+    arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, str]
+) -> dict[str, NDArray[Any]]:
+    """Return an episode's arrays in the order that its attributes name.
+
+    Raises:
+        ValueError: If that is no order.
+    """
+    order = read_described(attributes, ORDER, list[AnyText]) or []
+    ranks = {name: rank for rank, name in enumerate(order)}
+    return dict(sorted(arrays.items(), key=lambda item: ranks.get(item[0], len(ranks))))
 
 
 def observed_checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
