@@ -17,7 +17,7 @@ _FOR_USERS = {
     "demo": "robot_layouts.data.demo:demo",
     "record": "robot_layouts.data.playing_commands:record",
     "teleop": "robot_layouts.data.commands:teleop",
-    "replay": "robot_layouts.data.commands:replay",
+    "replay": "robot_layouts.data.recording.replaying:replay_command",
     "certify": "robot_layouts.data.playing_commands:certify",
     "convert": "robot_layouts.data.recording.convert:convert_command",
     "export": "robot_layouts.data.export.dataset:export_command",

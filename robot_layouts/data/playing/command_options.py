@@ -92,18 +92,39 @@ class Acting:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Players:
+class WorkerOptions:
+    """Which processes play the episodes of a recording.
+
+    Attributes:
+        workers: How many processes; 0: this one.
+        episode_timeout: End a worker whose episode takes longer, and play that again; none: never.
+    """
+
+    workers: Annotated[int, Word("W", at_least(0))] | None = 0
+    episode_timeout: Annotated[float | None, Word("SECONDS", _timeout)] = EPISODE_SECONDS
+
+    def executor(self) -> Executor:
+        """Return who plays.
+
+        Raises:
+            RobotLayoutsError: If the options contradict each other.
+        """
+        from robot_layouts.data.playing.executor import choose_executor
+
+        return choose_executor(self.workers, episode_timeout=self.episode_timeout)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Players(WorkerOptions):
     """Who plays the episodes.
 
     Attributes:
         workers: How many processes (one for each core or, with --ray, each CPU of the cluster, but
             no more than episodes); 0: this one.
-        episode_timeout: End a worker whose episode takes longer, and play that again; none: never.
         ray: Play on a Ray cluster that this machine has joined: "HOST:PORT" or "auto".
     """
 
     workers: Annotated[int, Word("W", at_least(0))] | None = None
-    episode_timeout: Annotated[float | None, Word("SECONDS", _timeout)] = EPISODE_SECONDS
     ray: Annotated[str, Word("ADDRESS")] | None = None
 
     def executor(self) -> Executor:
@@ -117,9 +138,7 @@ class Players:
             from robot_layouts.data.playing.ray_executor import RayExecutor
 
             return RayExecutor(self.ray, self.workers, episode_timeout=self.episode_timeout)
-        from robot_layouts.data.playing.executor import choose_executor
-
-        return choose_executor(self.workers, episode_timeout=self.episode_timeout)
+        return super().executor()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -118,6 +118,7 @@ class Recording(Sequence[Trajectory]):
 
     Attributes:
         path: The h5 file, or the first one.
+        opened: What it was opened by.
         manifest: What its files are; None if one file is read alone.
         task_id: Id of the task that was recorded.
         module: Module of a user's own that registers the task; None if every process knows it.
@@ -145,8 +146,8 @@ class Recording(Sequence[Trajectory]):
             TrajectoryError: If there is no such file, it or its json is of another kind or
                 damaged, its control mode is unknown, or it is not what the manifest lists.
         """
-        self.path = first_file(path)
-        self.manifest = None if self.path == Path(path) else read_manifest(self.path)
+        self.path, self.opened = first_file(path), Path(path)
+        self.manifest = None if self.path == self.opened else read_manifest(self.path)
         if self.manifest is not None and not self.manifest.files:
             raise TrajectoryError(f"{manifest_path(self.path)} lists no files")
         self._first = first = _File(self.path)
