@@ -20,6 +20,7 @@ _FOR_USERS = {
     "replay": "robot_layouts.data.recording.replaying:replay_command",
     "certify": "robot_layouts.data.playing_commands:certify",
     "convert": "robot_layouts.data.recording.convert:convert_command",
+    "merge": "robot_layouts.data.recording.merge:merge_command",
     "export": "robot_layouts.data.export.dataset:export_command",
     "report": "robot_layouts.data.dataset.report:report",
     "view": "robot_layouts.data.commands:view",

@@ -194,16 +194,21 @@ def action_split(described: Mapping[str, Mapping[str, Any]]) -> dict[str, slice]
     return split
 
 
-def differences(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+def differences(
+    recorded: Mapping[str, Any],
+    here: Mapping[str, Any],
+    sides: tuple[str, str] = ("recorded", "here"),
+) -> list[str]:
     """Return one phrase per field in which two descriptions differ; floats must be equal.
 
     Args:
         recorded: A description that was read from a file.
         here: The same of a task that was made.
+        sides: What the phrases call these.
     """
     before, now = (dict(_fields(json.loads(json.dumps(about)))) for about in (recorded, here))
     return [
-        f"{field}: recorded {before.get(field, _ABSENT)}, here {now.get(field, _ABSENT)}"
+        f"{field}: {sides[0]} {before.get(field, _ABSENT)}, {sides[1]} {now.get(field, _ABSENT)}"
         for field in dict.fromkeys([*before, *now])
         if before.get(field, _ABSENT) != now.get(field, _ABSENT)
     ]
@@ -313,9 +318,13 @@ def numbered(header: Mapping[str, Any], number: int) -> dict[str, Any]:
     return {**header, **({FILE_NUMBER: number} if number else {})}
 
 
-def header_differences(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+def header_differences(
+    recorded: Mapping[str, Any],
+    here: Mapping[str, Any],
+    sides: tuple[str, str] = ("recorded", "here"),
+) -> list[str]:
     """Return one phrase per field in which two headers differ, as far as it matters."""
-    return differences(_compared(recorded), _compared(here))
+    return differences(_compared(recorded), _compared(here), sides)
 
 
 def header_hash(header: Mapping[str, Any]) -> str:

@@ -11,7 +11,7 @@ import json
 import math
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -366,8 +366,12 @@ def read_header(path: Path) -> dict[str, Any]:
         return _header(file)
 
 
+Place = Path | str | Callable[[], Stored]
+"""Where an episode is: a part, a group of the present file, or what reads it."""
+
+
 def join(
-    path: Path, header: Mapping[str, Any], places: Mapping[int, Path | str]
+    path: Path, header: Mapping[str, Any], places: Mapping[int, Place]
 ) -> dict[int, JoinedEpisode]:
     """Write episodes into one h5 file, numbered in the order given, in place of what is there.
 
@@ -378,7 +382,7 @@ def join(
     Args:
         path: The file; it is replaced in one step, when the new one is complete and on the disk.
         header: What the episodes have in common.
-        places: What to join, by seed: parts, and names of groups in the present file.
+        places: What to join, by seed.
 
     Raises:
         RecordingError: If it cannot be written, or an episode not be read; nothing is changed.
@@ -396,6 +400,8 @@ def join(
         for number, (seed, place) in enumerate(places.items()):
             if isinstance(place, Path):
                 stored = read_part(place)[1]
+            elif callable(place):
+                stored = place()
             else:
                 assert present is not None  # its groups were listed
                 stored = read_joined_episode(present, place)

@@ -49,6 +49,7 @@ from robot_layouts.data.recording.disk import claim, disk_errors
 from robot_layouts.data.recording.episode_files import (
     JoinedEpisode,
     PartEncoder,
+    Place,
     Stored,
     damaged_recording,
     join,
@@ -149,7 +150,7 @@ class JoinedFiles:
     def write(
         self,
         file: OpenFile,
-        places: Mapping[int, Path | str],
+        places: Mapping[int, Place],
         sources: Iterable[Source] = (),
         *,
         last: bool,
@@ -158,7 +159,7 @@ class JoinedFiles:
 
         Args:
             file: What is there.
-            places: Where its episodes are, by seed, ascending: parts, or groups of what is there.
+            places: Where its episodes are, by seed, ascending.
             sources: What parts say of their source.
             last: Whether it may grow; else the next file becomes the last.
 
