@@ -21,7 +21,7 @@ _COLOURS = "rgb", "segmentation"  # what points have besides a place, where it i
 
 
 def point_cloud(
-    observation: Mapping[str, Any],
+    observation: Any,
     points: int,
     *,
     box: Box | None = None,
@@ -74,7 +74,7 @@ def point_cloud(
     }
 
 
-def world_points(observation: Mapping[str, Any]) -> Cloud:
+def world_points(observation: Any) -> Cloud:
     """Return all points that cameras see, in the world frame, one camera after the other.
 
     Args:
@@ -87,6 +87,8 @@ def world_points(observation: Mapping[str, Any]) -> Cloud:
     Raises:
         TaskError: If no points are observed.
     """
+    if not isinstance(observation, Mapping):
+        raise TaskError("this observation is one flat array, and no points are in it; see obs_mode")
     if "pointcloud" in observation:
         found = {name: np.asarray(values) for name, values in observation["pointcloud"].items()}
         xyzw = found.pop("xyzw")
