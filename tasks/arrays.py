@@ -29,16 +29,20 @@ def array_of(value: Any, what: str, error: type[RobotLayoutsError]) -> NDArray[A
         raise error(f"{what} is not an array of numbers: {problem}") from None
 
 
-def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(tree: Any, name: str = "", nothing: Any = None) -> Iterator[tuple[str, Any]]:
     """Yield what a nested mapping holds, by the path to it: ``"extra/tcp_pose"``.
 
     Args:
         tree: The mapping, or what one holds.
         name: What paths begin with.
+        nothing: What empty mappings are said to hold, by a path that ends with a slash; None skips
+            them.
     """
     if isinstance(tree, Mapping):
+        if not tree and nothing is not None:
+            yield f"{name}/", nothing
         for key, part in tree.items():
-            yield from leaves(part, f"{name}/{key}" if name else f"{key}")
+            yield from leaves(part, f"{name}/{key}" if name else f"{key}", nothing)
     else:
         yield name, tree
 

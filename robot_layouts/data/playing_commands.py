@@ -39,12 +39,14 @@ class RecordOptions(Acting):
         takeover: Policy that acts instead at every step for which it returns an action, not None.
         corrector: Policy whose action is recorded at every step beside the one that is played.
         num_envs: Episodes that each process plays at once.
+        observations: Do not record what is observed, though --obs-mode is given.
         file_size: Begin another file, trajectory_0001.h5 and so on, when one is so large.
     """
 
     takeover: Policy | None = None
     corrector: Policy | None = None
     num_envs: Count = 1
+    observations: bool = True
     file_size: Annotated[float, Word("MB", megabytes)] = FILE_SIZE
 
 
@@ -63,7 +65,7 @@ def record(
     The same command goes on where it was stopped or killed. Exit code: 0 if every episode was
     recorded, 1 if not, 2 for bad usage, 130 if interrupted. A policy maps an observation to an
     action; see robot_layouts.record. Episodes of other seeds may come from others: each says who
-    acted.
+    acted. With --obs-mode, what is observed is recorded, too, in ManiSkill's form.
 
     Args:
         task: Task id; MODULE:ID for one of your own.
@@ -108,7 +110,7 @@ def record(
                 out,
                 executor,
                 on_event=show,
-                **vars(options),
+                **{**options.playing(), "observations": None if options.observations else False},
                 **cell.making(),
             )
     except (RecordingError, WorkerError):
@@ -163,7 +165,7 @@ def evaluate(
             executor=executor,
             receipt=receipt,
             on_event=show,
-            **vars(acting),
+            **acting.playing(),
             **cell.making(),
         )
     print(found)

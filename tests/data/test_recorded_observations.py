@@ -1,4 +1,4 @@
-"""Observations of recordings: `replay --obs-mode` writes what a task observes."""
+"""Observations of recordings: `record` and `replay --obs-mode` write what a task observes."""
 
 from contextlib import closing
 from pathlib import Path
@@ -8,11 +8,14 @@ import h5py
 import numpy as np
 import pytest
 
+import robot_layouts as rl
 import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.recording import episode_files
 from robot_layouts.data.recording.recorder import Recorder
+from robots import RecordingError
 from tests.data.recordings import TWO_ROBOTS, edited, record
 
 LENGTHS = [3, 2]  # of the episodes of seeds 10 and 11
@@ -116,3 +119,54 @@ def test_an_observation_of_another_length_is_refused(pushed: Path, tmp_path: Pat
         file["traj_0/obs"] = rows
     with Recording(path) as file, pytest.raises(TrajectoryError, match=r"not \(4, …\)"):
         file.observations(0)
+
+
+def recorded(folder: Path, mode: str, *words: str) -> Path:
+    asked = ["--task=PushCube-v1", "--episodes=2", "--workers=0", f"--obs-mode={mode}", *words]
+    assert main(["record", *asked, f"--out={folder}"]) == 0
+    return folder / "trajectory.h5"
+
+
+def test_recorded_at_once_or_again_it_is_the_same(tmp_path: Path):
+    path = recorded(tmp_path / "at once", "state_dict")
+    plain = recorded(tmp_path / "plain", "state_dict", "--no-observations")
+    again = observed_again(plain, tmp_path / "again", "state_dict")
+    together = recorded(tmp_path / "together", "state_dict", "--num-envs=2")
+    assert together.read_bytes() == path.read_bytes()
+    with Recording(path) as file, Recording(plain) as silent, Recording(again) as replayed:
+        for number, episode in enumerate(file):
+            assert silent.observations(number) is None
+            found = by_name(file.observations(number))
+            assert len(found["obs/agent/qpos"]) == len(episode.actions) + 1
+            expected = by_name(replayed.observations(number))
+            assert list(found) == list(expected)
+            assert differences(expected, found) == []
+
+
+def test_the_order_of_parts_outlives_a_file_that_is_written_anew(tmp_path: Path):
+    path = recorded(tmp_path / "seen", "state_dict")
+    task = tasks.make("PushCube-v1", obs_mode="state_dict")
+    with Recording(path) as file:
+        assert list(file.observations(0)) == list(task.reset(seed=0)[0]) == ["agent", "extra"]
+        assert list(file.observations(0)["extra"]) == ["tcp_pose", "goal_pos", "obj_pose"]
+    before = path.read_bytes()
+    with h5py.File(path, "r+") as file:
+        del file["traj_0"]  # what is left moves up when it is recorded again
+    recorded(path.parent, "state_dict")
+    assert path.read_bytes() == before
+
+
+def test_an_environment_is_recorded_with_what_it_observes_if_asked(tmp_path: Path):
+    env = tasks.make("PushCube-v1", obs_mode="state")
+    rl.record(env, [3], tmp_path / "silent", workers=0)
+    rl.record(env, [3], tmp_path / "seen", workers=0, observations=True)
+    with Recording(tmp_path / "silent") as silent, Recording(tmp_path / "seen") as seen:
+        assert silent.observations(0) is None
+        assert seen.observations(0).shape == (len(seen[0].actions) + 1, 35)
+        assert seen.env_kwargs["obs_mode"] == "state"
+
+
+def test_an_episode_too_large_to_be_read_is_refused(tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(episode_files, "MAX_BYTES", 1000)
+    with pytest.raises(RecordingError, match="of which 1,000 can be stored; let cameras observe"):
+        record(tmp_path / "trajectory.h5", "PushCube-v1", LENGTHS)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
-import torch
 from typing_extensions import NotRequired, TypedDict
 
 from robot_layouts.core.files import read_json
@@ -20,8 +19,14 @@ from robot_layouts.core.pages import plural
 from robot_layouts.core.schema import FieldError, Name, Object, check, exactly, length, whole
 from robot_layouts.core.writing import write_whole
 from robot_layouts.data.playing.environment import versions as installed
-from robot_layouts.data.playing.executor import Executor, modules_of, play_all
-from robot_layouts.data.playing.replay import Replayed, open_recording, replay
+from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.replay import (
+    RecordedJob,
+    RecordedPlay,
+    Replayed,
+    open_recording,
+    replay,
+)
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.seeds import checked_seeds
 from robot_layouts.data.reading.json_files import (
@@ -32,11 +37,9 @@ from robot_layouts.data.reading.json_files import (
     sized_file,
     spans_of,
 )
-from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, all_files, first_file
 from robot_layouts.experts.touching import ArmWatch
 from robots import RecordingError, UnreadableFileError
-from tasks import MultiRobotTask
 
 FORMAT = "robot-layouts certificate 1"
 FILE = "certificate.json"
@@ -267,25 +270,8 @@ OnEvent = Callable[[RecordingCertificate, Event | None], None]
 
 
 @dataclass(frozen=True)
-class CertifyJob:
-    """What workers need to play episodes of a recording again; can be pickled.
-
-    Attributes:
-        path: The recording; workers read it at the same place.
-        task_id: Its task, ``module:Id`` for one of a module that no package lists, or None.
-        cell: Where robots stood and which, where the file cannot say it; see `task_for`.
-        task: Class of the task, which other machines may need.
-    """
-
-    path: Path
-    task_id: str | None
-    cell: Mapping[str, Any]
-    task: type[MultiRobotTask]
-
-    @property
-    def modules(self) -> tuple[str, ...]:
-        """What other machines may need to play it."""
-        return modules_of(self.task)
+class CertifyJob(RecordedJob):
+    """Episodes that are played again and certified."""
 
     def __call__(self) -> Callable[[int], CheckedEpisode]:
         """Open the recording and make its task in a worker.
@@ -294,21 +280,18 @@ class CertifyJob:
             MissingPackageError: If it takes python-fcl to see which arms touch.
             TrajectoryError: If that is impossible here.
         """
-        torch.set_num_threads(1)
         return _Certifier(self)
 
 
-class _Certifier:
+class _Certifier(RecordedPlay[CertifyJob]):
     """Plays the episodes of seeds again."""
 
     def __init__(self, job: CertifyJob) -> None:
-        self._file = open_recording(job.path, job.task_id)
-        self._task = task_for(self._file, **job.cell)
+        super().__init__(job)
         self._arms = ArmWatch(self._task)
-        self._places = {seed: place for place, seed in enumerate(self._file.seeds)}
 
     def __call__(self, seed: int) -> CheckedEpisode:
-        trajectory = self._file[self._places[seed]]
+        trajectory = self.recorded(seed)
         if not trajectory.rebuilt or trajectory.states is None:
             raise TrajectoryError(
                 f"episode {trajectory.episode_id} cannot be played exactly: it needs the seed of"
@@ -323,10 +306,6 @@ class _Certifier:
         steps = pairs[1:]  # the first is that after the reset
         touching = Counter(pair for touched in steps for pair in touched)
         return CheckedEpisode(replayed, dict(touching), sum(map(bool, steps)))
-
-    def close(self) -> None:
-        self._task.close()
-        self._file.close()
 
 
 def certify(
@@ -360,13 +339,13 @@ def certify(
     """
     out = out or certificate_path(path)
     with open_recording(path, task_id) as file:
-        cls = task_class(file, task_id)
         seeds = _seeds_of(file)
+        places = {seed: place for place, seed in enumerate(seeds)}
+        job = CertifyJob(**RecordedJob.about(file, places, cell))
         certificate = _begun(
             out, RecordingCertificate(file.task_id, _files(path, file), len(seeds))
         )
     on_event(certificate, None)
-    job = CertifyJob(path.absolute(), task_id, dict(cell or {}), cls)
     missing, written = [s for s in seeds if s not in certificate.checked], time.monotonic()
     try:
         with closing(play_all(executor, job, missing)) as events:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.data.actors import EXPERT
+from robot_layouts.data.point_clouds import Cloud
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Recording, Trajectory
-from robots import RobotDescriptor
+from robots import RobotDescriptor, UnknownNameError
 from tasks import TaskEnv
 from tasks.engine.columns import placed_bodies
 from tasks.episode import States
@@ -75,6 +76,8 @@ class Columns:
         actor: Who acted at each step, (T,): a number of `Credits.actors`;
             None if there are not several.
         corrections: What a corrector would have done, (T, A); None unless all episodes hold it.
+        points: What `robot_layouts.data.point_clouds.point_cloud` returned of what was observed,
+            each (T + 1, …); None if no points are exported.
     """
 
     episode_id: int
@@ -90,6 +93,7 @@ class Columns:
     source: Mapping[str, Any] | None = None
     actor: NDArray[np.int64] | None = None
     corrections: Floats | None = None
+    points: Cloud | None = None
 
     def __len__(self) -> int:
         """Return the number of steps T."""
@@ -156,6 +160,16 @@ class ColumnReader:
             actor=self.credits.numbers(trajectory) if self.credits else None,
             corrections=trajectory.corrections if self.credits and self.credits.corrected else None,
         )
+
+    def base_poses(self, columns: Columns, place: str) -> Floats:
+        """Return the pose of a robot's base in the world frame, (T + 1, 7) (m, wxyz).
+
+        Raises:
+            UnknownNameError: If there is no such place.
+        """
+        if place not in self._keys:
+            raise UnknownNameError("place", place, self._keys)
+        return columns.states["articulations"][self._keys[place]][:, :7]
 
     def tcp_poses(self, columns: Columns) -> dict[str, Floats]:
         """Return the TCP pose of each arm, robot or limb, in the world frame, (T + 1, 7) (m, wxyz).

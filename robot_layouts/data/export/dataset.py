@@ -7,7 +7,7 @@ import re
 import shutil
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from layouts import Layout
 from layouts.placement import RobotLike
-from robot_layouts.core.bounds import shown
-from robot_layouts.core.cli import Folder, Word
+from robot_layouts.core.bounds import checked_whole, shown
+from robot_layouts.core.cli import Count, Folder, Word
 from robot_layouts.core.commands import UsageError
 from robot_layouts.core.pages import plural
 from robot_layouts.core.progress import Progress as ProgressLine
@@ -29,6 +29,7 @@ from robot_layouts.data.playing.command_options import (
     stop_signals,
 )
 from robot_layouts.data.playing.executor import ProcessExecutor
+from robot_layouts.data.point_clouds import Box, point_cloud
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory
@@ -45,6 +46,11 @@ if TYPE_CHECKING:
     from robot_layouts.data.playing.executor import Executor
 FORMATS = ("lerobot", "robomimic")
 INSTALL = "pip install 'robot-layouts[export]'"
+
+BoxCorners = Annotated[
+    tuple[float, float, float, float, float, float],
+    Word(("X_MIN", "Y_MIN", "Z_MIN", "X_MAX", "Y_MAX", "Z_MAX")),
+]
 
 Progress = Callable[[float, int], None]
 Draw = Callable[[Columns], "Drawing | DrawnEpisode | None"]
@@ -133,6 +139,10 @@ class Export:
         instruction: What is to be done, in a sentence: of all episodes, or by ``episode_id``. Those
             without have their source's (``"instruction"`` in `Trajectory.source`), else their
             task's.
+        points: How many points of what the recording's cameras observed (``"robomimic"`` only);
+            see `robot_layouts.data.point_clouds.point_cloud`.
+        points_box: Which of them: the lowest and the highest corner of a box (m); None: all.
+        points_frame: The place of the robot from whose base they are measured; None: the world.
     """
 
     recording: str | PathLike[str]
@@ -149,6 +159,9 @@ class Export:
     depth: bool = False
     size: Size | None = None
     instruction: str | Mapping[int, str] | None = None
+    points: int | None = None
+    points_box: Box | None = None
+    points_frame: str | None = None
 
     @property
     def camera_names(self) -> tuple[str, ...]:
@@ -178,6 +191,7 @@ class Export:
             raise MissingPackageError(f"LeRobot datasets need pyarrow: {INSTALL}")
         if self.format == "robomimic":
             self._expect_robomimic()
+        self._expect_points()
         self._expect_pictures(here=here)
         refuse_used(Path(self.out))
 
@@ -189,6 +203,18 @@ class Export:
                     f"a robomimic dataset has no {what} here; leave it out, or choose"
                     f" {words}lerobot"
                 )
+
+    def _expect_points(self) -> None:
+        if self.points is None:
+            if self.points_box is not None or self.points_frame is not None:
+                raise TaskError("points_box and points_frame are of no use without points")
+            return
+        checked_whole("points", self.points, 1, None, TaskError)
+        if self.format != "robomimic":
+            raise TaskError(
+                "a LeRobot dataset has no points here: its columns are vectors and pictures; choose"
+                " robomimic, or take point_cloud of the recording's observations"
+            )
 
     def _expect_pictures(self, *, here: bool) -> None:
         names = self.camera_names
@@ -276,7 +302,7 @@ def export(
         ):
             for i, trajectory in enumerate(file):
                 if wanted.include_failures or succeeded(trajectory):
-                    columns = work.reader.read(trajectory)
+                    columns = work.columns(i, trajectory)
                     watch = _part(progress, i, len(columns) + 1, len(file))
                     drawn = draw(columns)
                     writer.add(columns, drawn or (), watch, text=work.text(trajectory))
@@ -315,6 +341,25 @@ class _Work:
             self._shots = choose_shots(task, names, size=wanted.size, depth=wanted.depth)
         self.seen = bool(self._shots and self._shots.cameras)
         self._instruction = instruction_of(task.task_class)
+
+    def columns(self, number: int, trajectory: Trajectory) -> Columns:
+        """Return the columns of an episode.
+
+        Raises:
+            TrajectoryError: If it lacks states, or points are asked for and nothing was observed.
+        """
+        columns, wanted = self.reader.read(trajectory), self._wanted
+        if wanted.points is None:
+            return columns
+        if (observed := self._file.observations(number)) is None:
+            raise TrajectoryError(
+                f"episode {trajectory.episode_id} was recorded without observations, of which"
+                " points are made; `robot-layouts replay --obs-mode pointcloud` adds them"
+            )
+        place = wanted.points_frame
+        frame = None if place is None else self.reader.base_poses(columns, place)
+        cloud = point_cloud(observed, wanted.points, box=wanted.points_box, frame=frame)
+        return replace(columns, points=cloud)
 
     def text(self, trajectory: Trajectory) -> str | None:
         """Return what is to be done in an episode; None if no text is given.
@@ -426,6 +471,9 @@ def export_command(
     depth: bool = False,
     size: PictureSize | None = None,
     instruction: Annotated[str, Word("TEXT")] | None = None,
+    points: Count | None = None,
+    points_box: BoxCorners | None = None,
+    points_frame: Annotated[str, Word("PLACE")] | None = None,
     include_failures: bool = False,
     only_successes: bool = False,
     task: str | None = None,
@@ -448,6 +496,9 @@ def export_command(
         depth: Write the cameras' depth as well (mm, 16 bits).
         size: Width and height of the pictures in pixels (each camera's own).
         instruction: What the policy is to do, in words (the task's own).
+        points: Write N points of what the recording's cameras observed (robomimic).
+        points_box: Only those in a box: its lowest and its highest corner (m).
+        points_frame: Measure them, and the box, from the base of this robot (the world).
         include_failures: Export episodes without success, too.
         only_successes: What happens anyway.
         task: The recording's task; MODULE:ID for one of your own.
@@ -471,6 +522,9 @@ def export_command(
         depth=depth,
         size=size,
         instruction=instruction,
+        points=points,
+        points_box=None if points_box is None else (points_box[:3], points_box[3:]),
+        points_frame=points_frame,
     )
     in_process = players.workers == 0 and players.ray is None
     executor = None if in_process else players.executor()

@@ -96,6 +96,9 @@ class RobomimicWriter(DatasetWriter):
             for key, rows in observed.items():
                 demo[f"obs/{key}"] = rows[:-1]
                 demo[f"next_obs/{key}"] = rows[1:]
+            for key, rows in (columns.points or {}).items():
+                demo[f"obs/points_{key}"] = rows[:-1]
+                demo[f"next_obs/points_{key}"] = rows[1:]
             self._add_pictures(demo, steps, frames, watch)
             if "state_layout" not in self._data.attrs:
                 self._data.attrs["state_layout"] = json.dumps(state_layout(columns.states))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from robot_layouts.core.cli import Word, at_least
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, check_timeout
@@ -75,30 +75,56 @@ class Acting:
 
     Attributes:
         policy: A policy that can be imported; by default the task's expert.
-        obs_mode: What policies observe: state, state_dict, rgb and others.
+        obs_mode: What policies observe: state, state_dict, rgb and others (state).
         camera_size: Width and height in pixels of the pictures observed (each camera's own).
         control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
     """
 
     policy: Policy = "expert"
-    obs_mode: Annotated[str, Word("MODE")] = "state"
+    obs_mode: Annotated[str, Word("MODE")] | None = None
     camera_size: PictureSize | None = None
     control_mode: ControlMode | None = None
 
+    def playing(self) -> dict[str, Any]:
+        """Return these options as arguments of what plays."""
+        given = vars(self)
+        return {name: value for name, value in given.items() if (name, value) != ("obs_mode", None)}
+
 
 @dataclass(frozen=True, kw_only=True)
-class Players:
+class WorkerOptions:
+    """Which processes play the episodes of a recording.
+
+    Attributes:
+        workers: How many processes; 0: this one.
+        episode_timeout: End a worker whose episode takes longer, and play that again; none: never.
+    """
+
+    workers: Annotated[int, Word("W", at_least(0))] | None = 0
+    episode_timeout: Annotated[float | None, Word("SECONDS", _timeout)] = EPISODE_SECONDS
+
+    def executor(self) -> Executor:
+        """Return who plays.
+
+        Raises:
+            RobotLayoutsError: If the options contradict each other.
+        """
+        from robot_layouts.data.playing.executor import choose_executor
+
+        return choose_executor(self.workers, episode_timeout=self.episode_timeout)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Players(WorkerOptions):
     """Who plays the episodes.
 
     Attributes:
         workers: How many processes (one for each core or, with --ray, each CPU of the cluster, but
             no more than episodes); 0: this one.
-        episode_timeout: End a worker whose episode takes longer, and play that again; none: never.
         ray: Play on a Ray cluster that this machine has joined: "HOST:PORT" or "auto".
     """
 
     workers: Annotated[int, Word("W", at_least(0))] | None = None
-    episode_timeout: Annotated[float | None, Word("SECONDS", _timeout)] = EPISODE_SECONDS
     ray: Annotated[str, Word("ADDRESS")] | None = None
 
     def executor(self) -> Executor:
@@ -112,9 +138,7 @@ class Players:
             from robot_layouts.data.playing.ray_executor import RayExecutor
 
             return RayExecutor(self.ray, self.workers, episode_timeout=self.episode_timeout)
-        from robot_layouts.data.playing.executor import choose_executor
-
-        return choose_executor(self.workers, episode_timeout=self.episode_timeout)
+        return super().executor()
 
 
 @dataclass(frozen=True, kw_only=True)

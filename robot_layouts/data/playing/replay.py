@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
+from robot_layouts.data.playing.executor import modules_of
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.provenance import STATES
-from robot_layouts.data.reading.recorded_task import task_class
+from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory
 from robots import TaskError
-from tasks import TaskEnv, get_task_class
+from tasks import MultiRobotTask, TaskEnv, get_task_class
 from tasks.episode import PlayedEpisode, States, play
 
 COLUMNS = ("rewards", "success", "terminated", "truncated")
@@ -271,3 +273,73 @@ def _signed(episode: PlayedEpisode, recorded: Trajectory) -> PlayedEpisode:
 
 def _refusal(trajectory: Trajectory, why: str) -> TrajectoryError:
     return TrajectoryError(f"traj_{trajectory.episode_id} {why}")
+
+
+@dataclass(frozen=True)
+class RecordedJob:
+    """What workers need to play episodes of a recording; can be pickled.
+
+    Attributes:
+        path: The recording; workers read it at the same place.
+        places: Place of each episode in the recording, by the seed that workers are given.
+        cell: Where robots stood and which, where the file cannot say it; see `task_for`.
+        task: Class of the task, which other machines may need.
+    """
+
+    path: Path
+    places: Mapping[int, int]
+    cell: Mapping[str, Any]
+    task: type[MultiRobotTask]
+
+    @staticmethod
+    def about(
+        file: Recording, places: Mapping[int, int], cell: Mapping[str, Any] | None
+    ) -> dict[str, Any]:
+        """Return what jobs have in common that play episodes of a recording."""
+        path, task = file.opened.absolute(), task_class(file)
+        return {"path": path, "places": places, "cell": dict(cell or {}), "task": task}
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """What other machines may need to play it."""
+        return modules_of(self.task)
+
+
+AnyRecordedJob = TypeVar("AnyRecordedJob", bound=RecordedJob)
+
+
+class RecordedPlay(Generic[AnyRecordedJob]):
+    """Plays the episodes of a recording in a worker."""
+
+    def __init__(self, job: AnyRecordedJob, **observing: Any) -> None:
+        """Open the recording, and make its task.
+
+        Args:
+            job: Which recording.
+            observing: What the task observes; see `task_for`.
+
+        Raises:
+            TrajectoryError: If that is impossible here.
+        """
+        torch.set_num_threads(1)  # sums are the same everywhere, and other workers want the cores
+        self._job, self._file = job, Recording(job.path)
+        self._task = task_for(self._file, **job.cell, **observing)
+
+    def recorded(self, seed: int) -> Trajectory:
+        """Return the episode of a seed as it was recorded."""
+        return self._file[self._job.places[seed]]
+
+    def close(self) -> None:
+        """Let the worlds go, and the file."""
+        self._task.close()
+        self._file.close()
+
+
+def places_by_seed(file: Recording, count: int | None = None) -> dict[int, int] | None:
+    """Return the places of the first episodes of a recording by the seeds of their resets.
+
+    None if the file does not name a seed for each, or one twice.
+    """
+    seeds = file.seeds[:count]
+    places = {seed: place for place, seed in enumerate(seeds) if seed is not None}
+    return places if len(places) == len(seeds) else None

@@ -26,6 +26,7 @@ from robot_layouts.experts import find_expert
 from robot_layouts.experts.registry import Expert
 from robots import ActionError, TaskError
 from tasks import MultiRobotTask, Scenario, TaskEnv
+from tasks.arrays import row_of, stacked
 from tasks.engine.actions import ActionReader
 from tasks.episode import REBUILT, PlayedEpisode, Policy, Score, States, StepResult, open_loop
 
@@ -100,11 +101,14 @@ class EpisodePlayer:
         total = fsum(moment.reward for moment in self.moments)
         return Score(success, total, len(self.moments), "" if success else self.reason)
 
-    def episode(self, states: States, drawn: dict[str, Any] | None) -> PlayedEpisode:
+    def episode(
+        self, states: States, observations: Any, drawn: dict[str, Any] | None
+    ) -> PlayedEpisode:
         """Return what happened.
 
         Args:
             states: Those of its environment, each entry (T + 1, k).
+            observations: What was observed there, (T + 1, …), or nested mappings of that, or None.
             drawn: What was varied in its world.
 
         Raises:
@@ -122,6 +126,7 @@ class EpisodePlayer:
             actor=np.array([choice.turn for choice in self.choices], np.uint8),
             corrections=np.stack(corrections) if corrections else None,
             reason=self.score.reason,
+            observations=observations,
         )
 
 
@@ -151,19 +156,30 @@ def states_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[Stat
         State dicts of `TaskEnv.get_state_dict`, each entry (T + 1, k) for T steps of its
         player.
     """
-    played = iter(_played_states(env, _acting(players)))
-    return [next(played) if p.rehearsed is None else p.rehearsed.states for p in players]
+    played = iter(_played(env, _acting(players)))
+    return [next(played)[0] if p.rehearsed is None else p.rehearsed.states for p in players]
 
 
-def record_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[PlayedEpisode]:
+def record_together(
+    env: TaskEnv, players: Sequence[EpisodePlayer], *, observed: bool = False
+) -> list[PlayedEpisode]:
     """Play an episode for each player, as `steps_together` does, and keep what happens.
+
+    Args:
+        env: The task.
+        players: Who plays. With ``observed``, rehearsed episodes are played, too: nothing was
+            observed in the rehearsal.
+        observed: Whether to keep what the task observes.
 
     Raises:
         TaskError: Also if a player takes no step.
     """
-    acting = _acting(players)
-    states = _played_states(env, acting)
-    played = iter([p.episode(states[i], env.drawn(i)) for i, p in enumerate(acting)])
+    acting = players if observed else _acting(players)
+    happened = _played(env, acting, observed=observed)
+    episodes = [p.episode(*happened[i], env.drawn(i)) for i, p in enumerate(acting)]
+    if observed:
+        return episodes
+    played = iter(episodes)
     return [next(played) if p.rehearsed is None else p.rehearsed for p in players]
 
 
@@ -172,26 +188,36 @@ def _acting(players: Sequence[EpisodePlayer]) -> list[EpisodePlayer]:
     return [player for player in players if player.rehearsed is None]
 
 
-def _played_states(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[States]:
+def _played(
+    env: TaskEnv, players: Sequence[EpisodePlayer], *, observed: bool = False
+) -> list[tuple[States, Any]]:
+    """Play, and return the states of each player's environment, and what was observed in it."""
     if not players:
         return []
+    seen: list[list[Any]] = [[] for _ in players]
     happening = steps_together(env, players)
-    next(happening)
-    tape = env.begin_tape()
-    env.write_tape(tape)
-    for _ in happening:
+    tape = None
+    for observation in happening:
+        tape = tape or env.begin_tape()
         env.write_tape(tape)
+        for i, player in enumerate(players if observed else ()):
+            if len(seen[i]) <= len(player.moments):  # it is not over since the step before
+                seen[i].append(row_of(observation, i))
+    assert tape is not None  # there is a reset at least
     states = tape.read()
     return [
-        {
-            kind: {name: rows[: len(player.moments) + 1, i] for name, rows in entries.items()}
-            for kind, entries in states.items()
-        }
+        (
+            {
+                kind: {name: rows[: len(player.moments) + 1, i] for name, rows in entries.items()}
+                for kind, entries in states.items()
+            },
+            stacked(seen[i]) if observed else None,
+        )
         for i, player in enumerate(players)
     ]
 
 
-def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[None]:
+def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[Any]:
     """Play an episode for each player, from freshly built worlds, until all are over.
 
     Every player sees its own environment alone, and draws from generators that are its own, so
@@ -204,7 +230,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
             them.
 
     Yields:
-        Nothing: once after the reset, and once after every step.
+        What is observed after the reset and after every step, in all environments.
 
     Raises:
         BatchError: If the actions of a batched policy are not one for each environment.
@@ -212,7 +238,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
     """
     ids = list(range(len(players)))
     observation, _ = env.reset([player.seed for player in players], REBUILT, ids)
-    yield
+    yield observation
     reader = ActionReader(env.layout, 1)
     actions = np.zeros((env.num_envs, env.layout.action_dim), np.float32)
     env.trust(actions)  # what is written there was checked
@@ -233,7 +259,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
             moment = StepResult(None, reward, bool(success), ended, late, seconds)
             players[i].choices.append(choices[i])
             players[i].moments.append(moment)
-        yield
+        yield observation
 
 
 def is_batched(policy: object) -> bool:

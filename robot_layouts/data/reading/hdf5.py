@@ -57,6 +57,7 @@ _UNKNOWN = "something in it is damaged, or is not read, such as links to other f
 _FLAG = {"FALSE": 0, "TRUE": 1}  # the enumeration that h5py writes for bool
 
 Shapes = dict[str, tuple[int, ...]]
+NOTHING = np.zeros(0, bool)
 _ERRORS = (
     *(OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError),
     *(MemoryError, EOFError, zlib.error, zipfile.BadZipFile),
@@ -137,12 +138,26 @@ class Hdf5File:
             names: What to look at directly in this group; everything if None.
         """
         with self._reading() as root:
-            return {name: array.shape for name, array in self._arrays(root, group, names).items()}
+            found = self._arrays(root, group, names)
+            return {name: array.shape for name, array in found.items() if array is not None}
 
-    def numbers(self, group: str, names: Collection[str] | None = None) -> dict[str, NDArray[Any]]:
-        """Return a group's arrays; the arguments are those of `shapes`."""
+    def numbers(
+        self, group: str, names: Collection[str] | None = None, *, empty: bool = False
+    ) -> dict[str, NDArray[Any]]:
+        """Return a group's arrays.
+
+        Args:
+            group: See `shapes`.
+            names: See `shapes`.
+            empty: Whether to return empty groups, too: as no numbers, by a name that ends with a
+                slash.
+        """
         with self._reading(MAX_BYTES) as root:
-            return {name: _read(array) for name, array in self._arrays(root, group, names).items()}
+            return {
+                name: NOTHING if array is None else _read(array)
+                for name, array in self._arrays(root, group, names).items()
+                if empty or array is not None
+            }
 
     @contextmanager
     def _reading(self, more: int = 0) -> Generator[Any]:
@@ -170,7 +185,7 @@ class Hdf5File:
         return found
 
     def _arrays(self, root: Any, name: str, names: Collection[str] | None) -> dict[str, Any]:
-        """Return the arrays in a group and in its groups.
+        """Return the arrays in a group and in its groups; None in place of an empty group.
 
         Raises:
             ContentError: If something cannot be read safely, the groups nest too deep, or there
@@ -290,6 +305,8 @@ def _walk(
     for name in sorted(members) if names is None else [name for name in names if name in members]:
         found = _member(group, name)
         if isinstance(found, _PYFIVE.Group):
+            if not len(found):
+                yield f"{prefix}{name}/", None
             yield from _walk(found, file_size, None, f"{prefix}{name}/", depth + 1)
         else:
             _check(name, found, file_size)
@@ -331,7 +348,7 @@ def _check(name: str, array: Any, file_size: int) -> None:
 
 
 def _bytes_of(array: Any) -> int:
-    return math.prod(array.shape) * array.dtype.itemsize
+    return 0 if array is None else math.prod(array.shape) * array.dtype.itemsize
 
 
 def _filters(array: Any) -> list[int]:

@@ -68,6 +68,7 @@ ARRAYS = (
 TEXTS = ("action_split", "episode")
 OBSERVATIONS = "obs"  # an array, or a group of some
 OBSERVED = "obs_checksum"  # the same of these, which are not read with an episode
+ORDER = "order"  # of all arrays, where some are observations
 
 # What may change from one resumption to the next, and what earlier versions did not write.
 NOT_COMPARED = ("source_type", "source_desc", "guessed", FILE_NUMBER)
@@ -193,16 +194,21 @@ def action_split(described: Mapping[str, Mapping[str, Any]]) -> dict[str, slice]
     return split
 
 
-def differences(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+def differences(
+    recorded: Mapping[str, Any],
+    here: Mapping[str, Any],
+    sides: tuple[str, str] = ("recorded", "here"),
+) -> list[str]:
     """Return one phrase per field in which two descriptions differ; floats must be equal.
 
     Args:
         recorded: A description that was read from a file.
         here: The same of a task that was made.
+        sides: What the phrases call these.
     """
     before, now = (dict(_fields(json.loads(json.dumps(about)))) for about in (recorded, here))
     return [
-        f"{field}: recorded {before.get(field, _ABSENT)}, here {now.get(field, _ABSENT)}"
+        f"{field}: {sides[0]} {before.get(field, _ABSENT)}, {sides[1]} {now.get(field, _ABSENT)}"
         for field in dict.fromkeys([*before, *now])
         if before.get(field, _ABSENT) != now.get(field, _ABSENT)
     ]
@@ -236,6 +242,19 @@ def checksums(attributes: Mapping[str, str], arrays: Mapping[str, NDArray[Any]])
     if any(name.partition("/")[0] == OBSERVATIONS for name in arrays):
         found[OBSERVED] = observed_checksum(arrays)
     return found
+
+
+def in_order(
+    arrays: Mapping[str, NDArray[Any]], attributes: Mapping[str, str]
+) -> dict[str, NDArray[Any]]:
+    """Return an episode's arrays in the order that its attributes name.
+
+    Raises:
+        ValueError: If that is no order.
+    """
+    order = read_described(attributes, ORDER, list[AnyText]) or []
+    ranks = {name: rank for rank, name in enumerate(order)}
+    return dict(sorted(arrays.items(), key=lambda item: ranks.get(item[0], len(ranks))))
 
 
 def observed_checksum(arrays: Mapping[str, NDArray[Any]]) -> str:
@@ -299,9 +318,13 @@ def numbered(header: Mapping[str, Any], number: int) -> dict[str, Any]:
     return {**header, **({FILE_NUMBER: number} if number else {})}
 
 
-def header_differences(recorded: Mapping[str, Any], here: Mapping[str, Any]) -> list[str]:
+def header_differences(
+    recorded: Mapping[str, Any],
+    here: Mapping[str, Any],
+    sides: tuple[str, str] = ("recorded", "here"),
+) -> list[str]:
     """Return one phrase per field in which two headers differ, as far as it matters."""
-    return differences(_compared(recorded), _compared(here))
+    return differences(_compared(recorded), _compared(here), sides)
 
 
 def header_hash(header: Mapping[str, Any]) -> str:

@@ -36,6 +36,7 @@ from robot_layouts.data.reading.provenance import (
     LAYOUT,
     OBSERVATIONS,
     OBSERVED,
+    ORDER,
     SIMULATION,
     STATES,
     TEXTS,
@@ -44,6 +45,7 @@ from robot_layouts.data.reading.provenance import (
     describe_layout,
     describe_simulation,
     differences,
+    in_order,
     listing,
     observed_checksum,
     read_described,
@@ -116,6 +118,7 @@ class Recording(Sequence[Trajectory]):
 
     Attributes:
         path: The h5 file, or the first one.
+        opened: What it was opened by.
         manifest: What its files are; None if one file is read alone.
         task_id: Id of the task that was recorded.
         module: Module of a user's own that registers the task; None if every process knows it.
@@ -143,8 +146,8 @@ class Recording(Sequence[Trajectory]):
             TrajectoryError: If there is no such file, it or its json is of another kind or
                 damaged, its control mode is unknown, or it is not what the manifest lists.
         """
-        self.path = first_file(path)
-        self.manifest = None if self.path == Path(path) else read_manifest(self.path)
+        self.path, self.opened = first_file(path), Path(path)
+        self.manifest = None if self.path == self.opened else read_manifest(self.path)
         if self.manifest is not None and not self.manifest.files:
             raise TrajectoryError(f"{manifest_path(self.path)} lists no files")
         self._first = first = _File(self.path)
@@ -379,18 +382,21 @@ class _File:
         """Return what was observed in an episode; see `Recording.observations`."""
         steps, _ = self.action_shape(entry, self.shapes(entry, ("actions",)))
         with self._damage(entry.group):
-            own = (self.hdf5.texts(entry.group, (OBSERVED,)) or {}).get(OBSERVED)
-            arrays = self.hdf5.numbers(entry.group, (OBSERVATIONS,))
-        if own not in (None, observed_checksum(arrays)):
+            texts = self.hdf5.texts(entry.group, (OBSERVED, ORDER)) or {}
+            arrays = self.hdf5.numbers(entry.group, (OBSERVATIONS,), empty=True)
+            arrays = in_order(arrays, texts)
+        if texts.get(OBSERVED) not in (None, observed_checksum(arrays)):
             self.refuse(entry, "its observations are damaged: their checksum is another")
         found: dict[str, Any] = {}
         for name, rows in arrays.items():
-            if len(rows) != steps + 1:
-                self.refuse(entry, f"its {name} has shape {rows.shape}, not ({steps + 1}, …)")
             *path, last = name.split("/")
             branch = found
             for key in path:
                 branch = branch.setdefault(key, {})
+            if not last:  # an empty group
+                continue
+            if len(rows) != steps + 1:
+                self.refuse(entry, f"its {name} has shape {rows.shape}, not ({steps + 1}, …)")
             branch[last] = rows
         return found.get(OBSERVATIONS)
 

@@ -8,17 +8,29 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import torch
-
 from robot_layouts.core.cli import Folder
 from robot_layouts.core.commands import printable
 from robot_layouts.core.progress import Progress
-from robot_layouts.data.playing.command_options import ControlMode, RecordingOption
+from robot_layouts.data.playing.command_options import (
+    GOES_ON,
+    ControlMode,
+    RecordingOption,
+    WorkerOptions,
+    stoppable,
+    tell,
+)
+from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.playing.mode_conversion import converted_steps, why_lost
+from robot_layouts.data.playing.replay import RecordedJob, RecordedPlay
+from robot_layouts.data.playing.scheduler import Event, WorkersDied
+from robot_layouts.data.playing.seeds import checked_seeds
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import FILE, Recording
+from robot_layouts.data.recording.episode_files import PartEncoder
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError
+from tasks import TaskEnv
 from tasks.episode import play
 
 
@@ -31,7 +43,7 @@ class Conversion:
         kept: Seeds of the episodes that succeed in the other mode, too.
         lost: Seeds of those that do not.
         left_out: Numbers of the episodes that have no seed, or did not succeed in their own mode.
-        reasons: Why those that do not succeed do not, in words, by seed.
+        reasons: Why those are not kept, in words, by seed.
     """
 
     path: Path
@@ -58,100 +70,179 @@ class Conversion:
         return "\n".join(["; ".join(lines) + f": {self.path}", *reasons])
 
 
+@dataclass(frozen=True)
+class ConvertJob(RecordedJob):
+    """Episodes that are converted.
+
+    Attributes:
+        mode: The other mode, or one by arm.
+        encoder: What encodes those that succeed in it.
+    """
+
+    mode: str | Mapping[str, str]
+    encoder: PartEncoder
+
+    def __call__(self) -> Callable[[int], bytes | str]:
+        """Open the recording and make its task in both modes, in a worker."""
+        return _ConvertPlay(self)
+
+
+class _ConvertPlay(RecordedPlay[ConvertJob]):
+    def __init__(self, job: ConvertJob) -> None:
+        super().__init__(job)
+        self._converted = _in_mode(self._task, job.mode)
+
+    def __call__(self, seed: int) -> bytes | str:
+        """Convert the episode of a seed; what is to be stored of it, or why it does not succeed."""
+        episode, source, task = self.recorded(seed), self._task, self._converted
+        actions, steps = converted_steps(source, seed, episode.actions, task)
+        played = play(task, seed, actions)
+        if not played.solved:
+            return why_lost(source, seed, episode.actions, task)
+        actor = None if episode.actor is None else episode.actor[steps]
+        return self._job.encoder.encode(replace(played, source=episode.source, actor=actor))
+
+    def close(self) -> None:
+        """Let the worlds go, and the file."""
+        self._converted.close()
+        super().close()
+
+
+def _in_mode(task: TaskEnv, mode: str | Mapping[str, str]) -> TaskEnv:
+    return task.task_class(replace(task.scenario, control_mode=mode))
+
+
 def convert(
     file: Recording,
     mode: str | Mapping[str, str],
     folder: Path,
+    executor: Executor | None = None,
+    *,
     count: int | None = None,
     cell: Mapping[str, Any] | None = None,
-    on_episode: Callable[[], None] = lambda: None,
+    on_event: Callable[[Conversion, Event | None], None] = lambda found, event: None,
 ) -> Conversion:
     """Record the successful episodes of a recording in another control mode.
 
-    Who acted is kept; what a corrector would have done is not, as it was not played.
+    Who acted is kept; what a corrector would have done is not, as it was not played. What is
+    recorded does not depend on who plays.
 
     Args:
         file: The recording.
         mode: The other mode, or one by arm.
         folder: Where ``trajectory.h5`` and ``trajectory.json`` are written; episodes that are
             there already are kept.
+        executor: Who plays; None: this process.
         count: How many of the first episodes; None: all.
         cell: Where robots stood and which, where the file cannot say it; see `task_for`.
-        on_episode: Called after each.
+        on_event: Called once at the start without an event, and after every event.
 
     Raises:
         TrajectoryError: If the recording cannot be played here.
-        TaskError: If there is no such mode.
+        TaskError: If there is no such mode, or two episodes have the same seed.
         RecordingError: If the folder cannot be written or holds a recording of something else.
+        WorkerError: If workers cannot be started, or die again and again.
+        KeyboardInterrupt: If interrupted; finished episodes are kept.
     """
-    with closing(task_for(file, **(cell or {}))) as source:
-        task = source.task_class(replace(source.scenario, control_mode=mode))
-        text = f"converted from {file.control_mode}"
-        with (
-            closing(task),
-            Recorder(
-                folder / FILE,
-                task,
-                resume=True,
-                source=file.source_type or "scripted",
-                source_desc=text,
-            ) as recorder,
-        ):
-            found = Conversion(recorder.path)
-            there = recorder.seeds
-            for number in range(len(file) if count is None else count):
-                episode = file[number]
-                if episode.seed is None or episode.solved is False:
-                    found.left_out.append(episode.episode_id)
-                elif episode.seed in there:
-                    found.kept.append(episode.seed)
-                else:
-                    actions, steps = converted_steps(source, episode.seed, episode.actions, task)
-                    played = play(task, episode.seed, actions)
-                    if played.solved:
-                        actor = None if episode.actor is None else episode.actor[steps]
-                        recorder.add(replace(played, source=episode.source, actor=actor))
-                        found.kept.append(episode.seed)
-                    else:
-                        found.lost.append(episode.seed)
-                        found.reasons[episode.seed] = why_lost(
-                            source, episode.seed, episode.actions, task
-                        )
-                on_episode()
+    with (
+        closing(task_for(file, **(cell or {}))) as source,
+        closing(_in_mode(source, mode)) as task,
+    ):
+        recorder = Recorder(
+            folder / FILE,
+            task,
+            resume=True,
+            source=file.source_type or "scripted",
+            source_desc=f"converted from {file.control_mode}",
+        )
+    with recorder:
+        found, places = Conversion(recorder.path), dict[int, int]()
+        for number in range(len(file) if count is None else count):
+            episode = file[number]
+            if episode.seed is None or episode.solved is False:
+                found.left_out.append(episode.episode_id)
+            elif episode.seed in places:
+                checked_seeds([*places, episode.seed])  # refuses it
+            else:
+                places[episode.seed] = number
+        missing = [seed for seed in places if seed not in recorder.seeds]
+        found.kept += [seed for seed in places if seed in recorder.seeds]
+        recorder.expect(missing)
+        on_event(found, None)
+        job = ConvertJob(
+            **RecordedJob.about(file, places, cell), mode=mode, encoder=recorder.encoder
+        )
+        with closing(play_all(executor or InProcessExecutor(), job, missing)) as events:
+            for event in events:
+                _note(found, event, recorder)
+                on_event(found, event)
+    order = {seed: rank for rank, seed in enumerate(places)}
+    found.kept.sort(key=order.__getitem__)
+    found.lost.sort(key=order.__getitem__)
     return found
 
 
+def _note(found: Conversion, event: Event, recorder: Recorder) -> None:
+    seed, result = event.seed, event.result
+    if event.error is not None and not isinstance(event.error, WorkersDied):
+        raise event.error
+    if seed is None or (result is None and event.error is None):
+        return
+    if isinstance(result, bytes):
+        recorder.store(seed, result)
+        found.kept.append(seed)
+    else:
+        recorder.give_up(seed)
+        found.lost.append(seed)
+        found.reasons[seed] = str(event.error) if result is None else result
+
+
 def convert_command(
-    recording: RecordingOption, *, to: ControlMode, out: Folder, episodes: int | None = None
+    recording: RecordingOption,
+    *,
+    to: ControlMode,
+    out: Folder,
+    episodes: int | None = None,
+    workers: WorkerOptions,
 ) -> int:
     """Record the episodes of a recording again in another control mode.
 
     Each episode is played in its own mode and in the other, and kept if it succeeds there too.
-    Those that did not succeed when they were recorded are left out. Exit code: 0 if all others were
-    kept, 1 if not, 2 for bad usage.
+    Those that did not succeed when they were recorded are left out. The same command goes on where
+    it was stopped. Exit code: 0 if all others were kept, 1 if not, 2 for bad usage, 130 if
+    interrupted.
 
     Args:
         recording: The recording.
         to: The other mode.
         out: Folder of trajectory.h5 and .json.
         episodes: Convert the first N episodes (all).
+        workers: Who plays.
 
     Raises:
         RobotLayoutsError: If the recording cannot be played or the other not be written.
     """
-    torch.set_num_threads(1)
     with recording.open() as file:
         count = recording.count(file, episodes)
         if not count:
             raise RecordingError(f"{file.path} has no episodes to convert")
-        with Progress(count, "episodes") as line:
+        executor, line = workers.executor(), Progress(count, "episodes")
+
+        def show(found: Conversion, event: Event | None) -> None:
+            if event is not None:
+                tell(line, event)
+            done = len(found.kept) + len(found.lost) + len(found.left_out)
+            line.update(done, "converting")
+
+        with stoppable(lambda: GOES_ON), line:
             summary = convert(
                 file,
                 to,
                 out,
-                count,
-                recording.cell.making(),
-                lambda: line.advance(1, "converting"),
+                executor,
+                count=count,
+                cell=recording.cell.making(),
+                on_event=show,
             )
     print(printable(str(summary)))
     return 0 if summary.complete else 1

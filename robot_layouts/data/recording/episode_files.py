@@ -11,7 +11,7 @@ import json
 import math
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -27,12 +27,14 @@ from typing_extensions import NotRequired, TypedDict
 from robot_layouts.core.files import parse_json, read_regular
 from robot_layouts.core.schema import AnyText, FieldError, Object, check, whole
 from robot_layouts.core.writing import PARTIAL, written_whole
-from robot_layouts.data.reading.hdf5 import MAX_BYTES, Hdf5File, damage_errors
+from robot_layouts.data.reading.hdf5 import MAX_BYTES, NOTHING, Hdf5File, damage_errors
 from robot_layouts.data.reading.json_files import MAX_SEED, OwnEpisode
 from robot_layouts.data.reading.provenance import (
     OBSERVATIONS,
+    ORDER,
     STATES,
     checksums,
+    in_order,
     read_described,
 )
 from robot_layouts.data.recording.disk import DiskFile, disk_errors
@@ -49,17 +51,19 @@ _MAX_PART = MAX_BYTES + 2**24  # bytes
 
 _ARRAY_NAME = (
     r"^(actions|rewards|success|terminated|truncated|actor|corrections"
-    r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3}|obs(/[^/\0]+){0,5})\Z"
+    r"|env_states(/[^/\0]+){2}|env_states/controller(/[^/\0]+){1,3}|obs(/[^/\0]+){0,5}/?)\Z"
 )
 # From HDF5 1.8, the first in which attributes may be larger than 64 kB.
 _VERSIONS = "v108", "latest"
 _GROUP = re.compile("traj_[0-9]+")
+_PACKED = ("rgb", "depth", "seg")  # what ManiSkill's RecordEpisode packs by gzip
 _TEXT = h5py.string_dtype()
 _HDF5: Any = h5py  # whose low-level modules pyright cannot look into
 
 
 class _Attributes(TypedDict):
     episode: AnyText
+    order: NotRequired[AnyText]
     action_split: NotRequired[AnyText]
 
 
@@ -81,7 +85,8 @@ class Stored:
     Attributes:
         attributes: Attributes of its group in the h5 file; ``episode`` is its entry in the json,
             without ``episode_id``.
-        arrays: The arrays of that group by their names there, as ``env_states/actors/cube``.
+        arrays: The arrays of that group by their names there, as ``env_states/actors/cube``; a name
+            that ends with a slash is an empty group.
 
     The attributes do not include the checksum.
     """
@@ -122,9 +127,22 @@ class PartEncoder:
         object.__setattr__(self, "_split", json.dumps(split))
 
     def encode(self, episode: PlayedEpisode) -> bytes:
-        """Return the part of an episode."""
+        """Return the part of an episode.
+
+        Raises:
+            RecordingError: If it is too large to be read again.
+        """
+        arrays = _arrays(episode)
         attributes = {"action_split": self._split, "episode": json.dumps(self._about(episode))}
-        return self.encode_stored(Stored(attributes, _arrays(episode)))
+        if episode.observations is not None:
+            attributes[ORDER] = json.dumps(list(arrays))
+        if (size := sum(rows.nbytes for rows in arrays.values())) > MAX_BYTES:
+            raise RecordingError(
+                f"the episode of seed {episode.seed} has {size:,} bytes of observations and states,"
+                f" of which {MAX_BYTES:,} can be stored; let cameras observe smaller pictures:"
+                " camera_size=(128, 128), or --camera-size 128x128"
+            )
+        return self.encode_stored(Stored(attributes, arrays))
 
     def encode_stored(self, stored: Stored) -> bytes:
         """Return the part of an episode that was joined already."""
@@ -274,16 +292,16 @@ def _is_part(path: Path) -> bool:
 
 
 def _arrays(episode: PlayedEpisode) -> dict[str, NDArray[Any]]:
-    arrays: dict[str, NDArray[Any]] = {"actions": episode.actions}
+    arrays: dict[str, NDArray[Any]] = {}  # in ManiSkill's order
+    if episode.observations is not None:
+        arrays.update(leaves(episode.observations, OBSERVATIONS, NOTHING))
+    for name in ("actions", "terminated", "truncated", "success"):
+        arrays[name] = getattr(episode, name)
     for kind, entries in episode.states.items():
         arrays.update({f"{STATES}{kind}/{name}": rows for name, rows in entries.items()})
-    for name in ("rewards", "success", "terminated", "truncated"):
-        arrays[name] = getattr(episode, name)
-    for name in ("actor", "corrections"):
+    for name in ("rewards", "actor", "corrections"):
         if (rows := getattr(episode, name)) is not None:
             arrays[name] = rows
-    if episode.observations is not None:
-        arrays.update(leaves(episode.observations, OBSERVATIONS))
     return arrays
 
 
@@ -348,18 +366,23 @@ def read_header(path: Path) -> dict[str, Any]:
         return _header(file)
 
 
+Place = Path | str | Callable[[], Stored]
+"""Where an episode is: a part, a group of the present file, or what reads it."""
+
+
 def join(
-    path: Path, header: Mapping[str, Any], places: Mapping[int, Path | str]
+    path: Path, header: Mapping[str, Any], places: Mapping[int, Place]
 ) -> dict[int, JoinedEpisode]:
     """Write episodes into one h5 file, numbered in the order given, in place of what is there.
 
     The bytes of the file depend on its episodes only, not on whether they come from parts or from
-    another file: names are written in sorted order, and nothing has a time stamp.
+    another file: nothing has a time stamp, and names are written in sorted order, or in ManiSkill's
+    where there are observations, which the file then keeps.
 
     Args:
         path: The file; it is replaced in one step, when the new one is complete and on the disk.
         header: What the episodes have in common.
-        places: What to join, by seed: parts, and names of groups in the present file.
+        places: What to join, by seed.
 
     Raises:
         RecordingError: If it cannot be written, or an episode not be read; nothing is changed.
@@ -377,6 +400,8 @@ def join(
         for number, (seed, place) in enumerate(places.items()):
             if isinstance(place, Path):
                 stored = read_part(place)[1]
+            elif callable(place):
+                stored = place()
             else:
                 assert present is not None  # its groups were listed
                 stored = read_joined_episode(present, place)
@@ -386,23 +411,32 @@ def join(
 
 
 def _write_episode(file: h5py.File, name: str, stored: Stored) -> None:
-    groups = {"": _new_group(file, name)}
+    ordered = ORDER in stored.attributes
+    groups = {"": _new_group(file, name, ordered=ordered)}
     own = checksums(stored.attributes, stored.arrays)
     for key, text in sorted({**stored.attributes, **own}.items()):
         groups[""].attrs.create(key, text, dtype=_TEXT)
-    for key, rows in sorted(stored.arrays.items()):
+    for key in stored.arrays if ordered else sorted(stored.arrays):
         above = ""
         *path, last = key.split("/")
         for part in path:
             inside = f"{above}/{part}"
             if inside not in groups:
-                groups[inside] = _new_group(groups[above], part)
+                groups[inside] = _new_group(groups[above], part, ordered=ordered)
             above = inside
-        _write_array(groups[above], last, rows)
+        if last:
+            _write_array(groups[above], last, stored.arrays[key], _is_observed(key))
 
 
-def _write_array(group: h5py.Group, name: str, rows: NDArray[Any]) -> None:
-    """Write what `create_dataset` would, at a third of its cost."""
+def _is_observed(name: str) -> bool:
+    return name.partition("/")[0] == OBSERVATIONS
+
+
+def _write_array(group: h5py.Group, name: str, rows: NDArray[Any], observed: bool) -> None:
+    """Write what `create_dataset` would, at a third of its cost; pictures as ManiSkill does."""
+    if observed and name in _PACKED:
+        group.create_dataset(name, data=rows, compression="gzip", compression_opts=5)
+        return
     kind, space = _HDF5.h5t.py_create(rows.dtype, logical=True), _HDF5.h5s.create_simple(rows.shape)
     properties = _HDF5.h5p.create(_HDF5.h5p.DATASET_CREATE)
     properties.set_obj_track_times(False)
@@ -411,10 +445,20 @@ def _write_array(group: h5py.Group, name: str, rows: NDArray[Any]) -> None:
     dataset.write(_HDF5.h5s.ALL, _HDF5.h5s.ALL, rows, kind)
 
 
-def _new_group(above: h5py.Group, name: str) -> h5py.Group:
-    """Make a group without a time stamp, which `create_group` of older h5py writes."""
+def _new_group(above: h5py.Group, name: str, *, ordered: bool) -> h5py.Group:
+    """Make a group without a time stamp, which `create_group` of older h5py writes.
+
+    Args:
+        above: Where.
+        name: Its name.
+        ordered: Whether it keeps the order in which its members are written.
+    """
     properties = _HDF5.h5p.create(_HDF5.h5p.GROUP_CREATE)
     properties.set_obj_track_times(False)
+    if ordered:
+        properties.set_link_creation_order(
+            _HDF5.h5p.CRT_ORDER_TRACKED | _HDF5.h5p.CRT_ORDER_INDEXED
+        )
     return h5py.Group(_HDF5.h5g.create(above.id, name.encode(), None, properties))
 
 
@@ -431,7 +475,8 @@ def read_joined_episode(file: Hdf5File, name: str) -> Stored:
     Raises:
         ValueError: If its checksum is another, or it is no episode.
     """
-    attributes, arrays = file.texts(name) or {}, file.numbers(name)
+    attributes = file.texts(name) or {}
+    arrays = in_order(file.numbers(name, empty=True), attributes)
     for kind, own in checksums(attributes, arrays).items():
         if attributes.pop(kind, own) != own:  # an earlier version wrote none
             raise FieldError(f"the checksum of {name} is another")

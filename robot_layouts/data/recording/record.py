@@ -131,10 +131,12 @@ class EpisodeJob(EpisodesJob):
     Attributes:
         actors: Who plays, as the recording keeps it.
         encoder: What encodes finished episodes.
+        observed: Whether what is observed is recorded.
     """
 
     actors: Actors
     encoder: PartEncoder
+    observed: bool = False
 
     def __call__(self) -> Callable[[int], dict[int, Recorded | str]]:
         """Make the task in a worker, and return what plays and encodes the episodes of seeds.
@@ -175,7 +177,7 @@ class _RecordingPlay(EpisodesPlay[EpisodeJob]):
     def _play(self, seeds: Sequence[int]) -> dict[int, Recorded | str]:
         players = [self._casting(seed) for seed in seeds]
         with torch.no_grad():
-            episodes = record_together(self._env, players)
+            episodes = record_together(self._env, players, observed=self._job.observed)
         return {
             player.seed: (player.score, self._job.encoder.encode(self._job.actors.sign(episode)))
             for player, episode in zip(players, episodes, strict=True)
@@ -258,6 +260,7 @@ def record(
     takeover: Policy | str | None = None,
     corrector: Policy | str | None = None,
     num_envs: int = 1,
+    observations: bool | None = None,
     file_size: float = FILE_SIZE,
     on_event: Callable[[Summary, Event | None], None] = lambda summary, event: None,
     **making: Unpack[MakingFields],
@@ -292,10 +295,12 @@ def record(
             is recorded is the same, and so it is with a policy whose attribute ``batched`` is True
             if each row of its actions follows from that row of the observations alone; see
             `robot_layouts.data.evaluate`.
+        observations: Whether to record what is observed, by ``obs_mode``, after the reset and after
+            every step, as ManiSkill does; None: if ``obs_mode`` is given.
         file_size: Size at which a further h5 file is begun (MB); see `Recorder`.
         on_event: Called once at the start without an event, and after every event.
         making: Arguments of `tasks.make`, such as ``layout``, ``robots`` and ``control_mode``, if
-            ``task`` is an id. ``obs_mode`` is what policies observe; observations are not recorded.
+            ``task`` is an id. ``obs_mode`` is what policies observe.
 
     Returns:
         What was recorded. It stands for the folder wherever a path does: ``Recording(summary)``.
@@ -322,8 +327,12 @@ def record(
     checked_whole("num_envs", num_envs, 1, None, TaskError)
     cast, actors = Actors.cast(cls, policy, takeover, corrector)
     env = cls(scenario)
+    observed = "obs_mode" in making if observations is None else observations
     summary = Summary(FOLDER / cls.task_id if folder is None else Path(folder))
-    with Recorder(summary.path, env, resume=True, file_size=file_size, **actors.header) as recorder:
+    recorder = Recorder(
+        summary.path, env, resume=True, file_size=file_size, observed=observed, **actors.header
+    )
+    with recorder:
         env.close()
         summary.damaged, there = recorder.damaged, recorder.seeds
         missing = [seed for seed in seeds if seed not in there]
@@ -332,7 +341,7 @@ def record(
         recorder.expect(missing)
         together = grouped(missing, num_envs)
         at_once = replace(scenario, num_envs=max(map(len, together.values()), default=1))
-        job = EpisodeJob(cls, at_once, cast, together, actors, recorder.encoder)
+        job = EpisodeJob(cls, at_once, cast, together, actors, recorder.encoder, observed)
         try:
             with closing(play_all(executor, job, list(together))) as events:
                 for event in _of_episodes(events, together):

@@ -45,11 +45,11 @@ from robot_layouts.data.reading.provenance import (
     numbered,
     recorded_control_mode,
 )
-from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.disk import claim, disk_errors
 from robot_layouts.data.recording.episode_files import (
     JoinedEpisode,
     PartEncoder,
+    Place,
     Stored,
     damaged_recording,
     join,
@@ -150,7 +150,7 @@ class JoinedFiles:
     def write(
         self,
         file: OpenFile,
-        places: Mapping[int, Path | str],
+        places: Mapping[int, Place],
         sources: Iterable[Source] = (),
         *,
         last: bool,
@@ -159,7 +159,7 @@ class JoinedFiles:
 
         Args:
             file: What is there.
-            places: Where its episodes are, by seed, ascending: parts, or groups of what is there.
+            places: Where its episodes are, by seed, ascending.
             sources: What parts say of their source.
             last: Whether it may grow; else the next file becomes the last.
 
@@ -446,11 +446,6 @@ class Recorder:
         """
         self.store(episode.seed, self.encoder.encode(episode))
 
-    def add_new(self, episode: PlayedEpisode) -> None:
-        """Write one episode unless there is one of its seed; else as `add`."""
-        if episode.seed not in self.seeds:
-            self.add(episode)
-
     def store(self, seed: int, part: bytes) -> None:
         """Write an episode that the `encoder` encoded, perhaps elsewhere; else as `add`."""
         if self._closed:
@@ -605,24 +600,3 @@ def _expect_file_or_nothing(path: Path) -> None:
             open_regular(path).close()
         except UnreadableFileError as error:
             raise RecordingError(f"cannot write {path}: {error.strerror}") from error
-
-
-def again(file: Recording, task: TaskEnv, folder: Path) -> Recorder:
-    """Return what records the episodes of a recording again, with what a task observes in them.
-
-    Args:
-        file: The recording.
-        task: The same task, which observes.
-        folder: Where to; episodes that are there already are kept.
-
-    Raises:
-        RecordingError: If the folder cannot be written or holds a recording of something else.
-    """
-    return Recorder(
-        folder / FILE,
-        task,
-        resume=True,
-        source=file.source_type or "scripted",
-        source_desc=f"{task.obs_mode} of a recording",
-        observed=True,
-    )
