@@ -18,6 +18,7 @@ from robot_layouts.simulation.maths import Floats, all_finite
 from robot_layouts.simulation.scene.parts import Part
 from robots import SimulationError, TaskError
 from tasks.engine.actions import ActionReader
+from tasks.engine.cameras import camera_for_people
 from tasks.engine.checks import (
     ELAPSED,
     ReturnedArrays,
@@ -149,9 +150,18 @@ class TaskEnv(Remade):
         observed = read_mode(scenario.obs_mode)
         cameras = scenario.cameras or task.cameras
         size = scenario.camera_size
-        shown = scenario.render_mode in SENSOR_RENDER_MODES
         self.observer = Observer(
-            layout, observed, cameras, task.sensed, task.viewpoint, size, shown=shown
+            layout,
+            observed,
+            cameras,
+            task.sensed,
+            task.viewpoint,
+            size,
+            configs=scenario.sensor_configs,
+            shown=scenario.render_mode in SENSOR_RENDER_MODES,
+        )
+        self._for_people = camera_for_people(
+            task.viewpoint, scenario.human_render_camera_configs or {}
         )
         first = task.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
@@ -170,6 +180,7 @@ class TaskEnv(Remade):
             scenario.physics,
             control_frequency=scenario.control_frequency,
             visuals=scenario.draws,
+            shadows=scenario.enable_shadow,
             links_pass=task.native_id is not None,
             simulator=scenario.simulator,
         )
@@ -402,8 +413,9 @@ class TaskEnv(Remade):
     def render(self) -> np.ndarray:
         """Return a picture of every environment, (N, H, W, 3) uint8.
 
-        With ``render_mode="rgb_array"`` it is one for people, 512 pixels wide and high; with
-        ``"sensors"`` what each camera sees, in colours, side by side; with ``"all"`` both.
+        With ``render_mode="rgb_array"`` it is one for people, 512 pixels wide and high unless
+        ``human_render_camera_configs`` say otherwise; with ``"sensors"`` what each camera sees, in
+        colours, side by side; with ``"all"`` both.
 
         Raises:
             TaskError: If the task was made without a ``render_mode``.
@@ -415,7 +427,8 @@ class TaskEnv(Remade):
             if self._camera is None:
                 from robot_layouts.simulation.rendering import Cameras
 
-                self._camera = Cameras(self.simulation, *self.task.viewpoint)
+                view = self._for_people
+                self._camera = Cameras(self.simulation, *self.task.viewpoint, camera=view)
             pictures.append(self._camera.take())
         if mode in SENSOR_RENDER_MODES:
             pictures += self.observer.pictures(self.simulation)

@@ -59,6 +59,14 @@ class Scenario:
             of the robots come after.
         camera_size: Width and height (pixels) of what all these cameras see; None: each camera's
             own.
+        sensor_configs: What of these cameras is otherwise, as in native: of all of them ``width``,
+            ``height`` (pixels), ``fov`` (rad) or ``intrinsic`` (3, 3), ``near``, ``far`` (m),
+            ``pose`` (position and quaternion, wxyz, of the world or of the link), ``mount`` (robot
+            and link) and ``shader_pack`` (``"minimal"`` or ``"default"``), and by a camera's name
+            a mapping of its own.
+        human_render_camera_configs: Likewise of the camera that draws for people,
+            ``"render_camera"``.
+        enable_shadow: Whether the first light casts shadows, as in native.
         simulator: ``"sapien3"``.
         bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
             take no action number, or ``"act"``, with action numbers of their own. None refuses
@@ -81,6 +89,9 @@ class Scenario:
     headless: bool = True
     cameras: Sequence[Camera] = field(default_factory=list[Camera])
     camera_size: tuple[int, int] | None = None
+    sensor_configs: Mapping[str, Any] | None = None
+    human_render_camera_configs: Mapping[str, Any] | None = None
+    enable_shadow: bool = False
     simulator: str = "sapien3"
     bystanders: str | None = None
     randomization: Randomization | None = None
@@ -138,7 +149,7 @@ class Scenario:
         if self.control_mode is not None:
             check_control_mode(self.layout, self.control_mode)
         read_mode(self.obs_mode)
-        for name in ("check_layout", "headless"):
+        for name in ("check_layout", "headless", "enable_shadow"):
             checked_flag(name, getattr(self, name), TaskError)
         if not self.headless:
             raise TaskError("headless=False is not offered: no window is opened; use render_mode")
@@ -162,6 +173,9 @@ class ScenarioFields(TypedDict, total=False):
     headless: bool
     cameras: Sequence[Camera]
     camera_size: tuple[int, int] | None
+    sensor_configs: Mapping[str, Any] | None
+    human_render_camera_configs: Mapping[str, Any] | None
+    enable_shadow: bool
     simulator: str
     check_layout: bool
     bystanders: str | None
