@@ -19,6 +19,7 @@ from robots import TaskError, UnknownNameError
 from tasks.engine.cameras import checked_size
 from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
+from tasks.engine.touch import touch_links
 from tasks.language.needs import ACT, HOLD
 from tasks.randomization.declaration import Randomization
 
@@ -67,6 +68,10 @@ class Scenario:
         human_render_camera_configs: Likewise of the camera that draws for people,
             ``"render_camera"``.
         enable_shadow: Whether the first light casts shadows, as in native.
+        touch: Which links feel what touches them: True for the fingers of all arms, or a mapping
+            from arms to names of links, or to True for their fingers. Each link's contact force is
+            a part of the observation, ``left.touch.panda_leftfinger``, (N, 3) (N), in the link's
+            frame. None for none, as in native.
         simulator: ``"sapien3"``.
         bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
             take no action number, or ``"act"``, with action numbers of their own. None refuses
@@ -92,6 +97,7 @@ class Scenario:
     sensor_configs: Mapping[str, Any] | None = None
     human_render_camera_configs: Mapping[str, Any] | None = None
     enable_shadow: bool = False
+    touch: bool | Mapping[str, Sequence[str] | bool] | None = None
     simulator: str = "sapien3"
     bystanders: str | None = None
     randomization: Randomization | None = None
@@ -148,7 +154,8 @@ class Scenario:
             checked_choice(name, getattr(self, name), choices, TaskError)
         if self.control_mode is not None:
             check_control_mode(self.layout, self.control_mode)
-        read_mode(self.obs_mode)
+        if read_mode(self.obs_mode).columns and touch_links(self.layout, self.touch):
+            raise TaskError(f"obs_mode {self.obs_mode!r} has no columns for touch")
         for name in ("check_layout", "headless", "enable_shadow"):
             checked_flag(name, getattr(self, name), TaskError)
         if not self.headless:
@@ -176,6 +183,7 @@ class ScenarioFields(TypedDict, total=False):
     sensor_configs: Mapping[str, Any] | None
     human_render_camera_configs: Mapping[str, Any] | None
     enable_shadow: bool
+    touch: bool | Mapping[str, Sequence[str] | bool] | None
     simulator: str
     check_layout: bool
     bystanders: str | None
