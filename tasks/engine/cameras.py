@@ -151,6 +151,20 @@ def _pose(what: str, pose: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return numbers[:3], numbers[3:]
 
 
+def plain(settings: Any) -> Any:
+    """Return settings, such as `Configs`, as plain data of which the same cameras are made."""
+    if isinstance(settings, Mapping):
+        return {key: plain(value) for key, value in settings.items()}
+    if hasattr(settings, "p") and hasattr(settings, "q"):
+        position, quaternion = _pose("pose", settings)
+        return [*position, *quaternion]
+    if hasattr(settings, "tolist"):  # an array or a tensor
+        return settings.tolist()
+    if isinstance(settings, (tuple, list)):
+        return [plain(value) for value in settings]
+    return settings
+
+
 def _with(camera: AnyCamera, **changed: Any) -> AnyCamera:
     """Return a camera of which something is otherwise: ``position``, ``on`` and fields of it."""
     if isinstance(camera, RobotCamera):

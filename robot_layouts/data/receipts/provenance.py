@@ -43,6 +43,7 @@ from robots import RobotLayoutsError, UnreadableFileError
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_checksums
 from tasks import MultiRobotTask, Scenario
+from tasks.engine.cameras import plain
 from tasks.episode import Score
 from tasks.randomization.declaration import Randomization
 
@@ -64,6 +65,9 @@ class _ProvenanceMaking(TypedDict):
     camera_size: Annotated[list[Annotated[int, whole(1, _MOST)]], length(2)] | None
     bystanders: Name | None
     simulator: Name
+    sensor_configs: NotRequired[Object]
+    enable_shadow: NotRequired[bool]
+    touch: NotRequired[bool | Object]
     num_envs: NotRequired[Annotated[int, whole(1, _MOST)]]
 
 
@@ -97,6 +101,11 @@ def describe_making(
         "camera_size": scenario.camera_size,
         "bystanders": scenario.bystanders,
         "simulator": scenario.simulator,
+        **_filled(
+            sensor_configs=plain(scenario.sensor_configs),
+            enable_shadow=scenario.enable_shadow,
+            touch=plain(scenario.touch),
+        ),
         **({} if num_envs is None else {"num_envs": num_envs}),
     }
     return json.loads(json.dumps(described))
@@ -297,7 +306,7 @@ def _importable_name(policy: Any) -> str | None:
     return None if found is None else f"{module}:{found}"
 
 
-def _filled(**parts: Mapping[str, Any]) -> dict[str, Any]:
+def _filled(**parts: Any) -> dict[str, Any]:
     """Return those parts that hold something."""
     return {name: part for name, part in parts.items() if part}
 
