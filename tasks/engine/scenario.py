@@ -63,8 +63,8 @@ class Scenario:
         sensor_configs: What of these cameras is otherwise, as in native: of all of them ``width``,
             ``height`` (pixels), ``fov`` (rad) or ``intrinsic`` (3, 3), ``near``, ``far`` (m),
             ``pose`` (position and quaternion, wxyz, of the world or of the link), ``mount`` (robot
-            and link) and ``shader_pack`` (``"minimal"`` or ``"default"``), and by a camera's name
-            a mapping of its own.
+            and link) and ``shader_pack`` (``"minimal"``, ``"default"``, ``"rt"``, ``"rt-med"`` or
+            ``"rt-fast"``), and by a camera's name a mapping of its own.
         human_render_camera_configs: Likewise of the camera that draws for people,
             ``"render_camera"``.
         enable_shadow: Whether the first light casts shadows, as in native.

@@ -165,12 +165,8 @@ WRONG = [
         "is a camera of 'arm' and cannot ride on 'left'",
     ),
     (
-        {"sensor_configs": {"shader_pack": "rt-fast"}},
-        "shader 'rt-fast' traces rays, which takes an NVIDIA card",
-    ),
-    (
         {"sensor_configs": {"shader_pack": "defualt"}},
-        "shader 'defualt' is not offered; choices: 'minimal', 'default'",
+        "shader 'defualt' is not offered; choices: 'minimal', 'default', 'rt'",
     ),
     (
         {"human_render_camera_configs": {"base_camera": {}}},
@@ -201,7 +197,10 @@ def test_wrong_settings_are_refused_before_anything_is_built(
         ({"target": TARGET, "quaternion": (1, 0, 0, 0)}, "has both target and quaternion"),
         ({"target": TARGET, "fov": 1.0, "intrinsic": INTRINSIC}, "has both fov and intrinsic"),
         ({"target": TARGET, "mount": ("arm",)}, "a robot in the layout and a link of it"),
-        ({"target": TARGET, "shader": "rt"}, "traces rays"),
+        (
+            {"target": TARGET, "shader": "rt-slow"},
+            "shader 'rt-slow' is not offered; choices",
+        ),
     ],
 )
 def test_a_camera_checks_itself(fields: dict[str, Any], message: str):

@@ -40,6 +40,11 @@ SETTINGS = {
     },
     "slower shaders for one camera": {"hand_camera": {"shader_pack": "default"}},
     "slower shaders for all": {"shader_pack": "default"},
+    "traced rays for one camera": {
+        "width": 48,
+        "height": 32,
+        "hand_camera": {"shader_pack": "rt-fast"},
+    },
 }
 
 
@@ -79,7 +84,7 @@ def our_differences(look: Look, task_id: str, obs_mode: str, **making: Any) -> l
     return found if same else [*found, "picture"]
 
 
-@pytest.mark.parametrize("what", SETTINGS)
+@pytest.mark.parametrize("what", [name for name in SETTINGS if "rays" not in name])
 def test_settings_by_name_are_native_s(what: str):
     sensors = unit(SETTINGS[what])
     look = native_look("PickCube-v1", EVERYTHING, "panda_wristcam", sensors=copy.deepcopy(sensors))
@@ -93,6 +98,16 @@ def test_settings_by_name_are_native_s(what: str):
         )
         assert "/sensor_data/base_camera/rgb at 0" in found
         assert not [name for name in found if "hand_camera" in name]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("shaders", ["rt", "rt-med", "rt-fast"])
+def test_traced_rays_are_native_s(shaders: str):
+    configs = {"shader_pack": shaders, "width": 32, "height": 24}
+    more = {"human_render_camera_configs": configs}
+    look = native_look("PickCube-v1", "rgb+normal", sensors=dict(configs), **copy.deepcopy(more))
+    making = {"sensor_configs": configs, **more}
+    assert our_differences(look, "PickCube-v1", "rgb+normal", **making) == []
 
 
 @pytest.mark.parametrize("shaders", ["minimal", "default"])

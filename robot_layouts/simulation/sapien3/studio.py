@@ -32,6 +32,7 @@ from robot_layouts.simulation.sapien3.device import expect_render_device
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.scene.cameras import (
     RAW_IMAGES,
+    RAY_TRACING,
     AnyCamera,
     RobotCamera,
     View,
@@ -57,26 +58,26 @@ _FORMATS = {
     "minimal": {COLOR: "r8g8b8a8unorm", PLACE: "r16g16b16a16sint"},
     "default": {COLOR: "r32g32b32a32sfloat"},
 }
-_PIXELS: dict[str, dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[Any]]]]] = {
-    "minimal": {
-        "rgb": (COLOR, lambda x: x[..., :3]),
-        "position": (PLACE, lambda x: x[..., :3]),
-        "depth": (PLACE, lambda x: -x[..., 2:3]),
-        "segmentation": (PLACE, lambda x: x[..., 3:]),
-        **{image: (image, lambda x: x) for image in RAW_IMAGES["minimal"]},
-    },
-    "default": {
-        "rgb": (COLOR, lambda x: _scaled(x, 255, torch.uint8)),
-        "depth": ("Position", lambda x: -_scaled(x, 1000, torch.int16)[..., 2:]),
-        "position": ("Position", lambda x: _scaled(x, 1000, torch.int16)),
-        "segmentation": ("Segmentation", lambda x: x[..., 1:2].astype(np.int64)),
-        "normal": ("Normal", lambda x: x[..., :3]),
-        "albedo": ("Albedo", lambda x: _scaled(x, 255, torch.uint8)),
-        COLOR: (COLOR, lambda x: x),
-        "Position": ("Position", lambda x: x),
-        "Segmentation": ("Segmentation", lambda x: x.astype(np.int64)),
-    },
+_Pixels = dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[Any]]]]
+_QUICK: _Pixels = {
+    "rgb": (COLOR, lambda x: x[..., :3]),
+    "position": (PLACE, lambda x: x[..., :3]),
+    "depth": (PLACE, lambda x: -x[..., 2:3]),
+    "segmentation": (PLACE, lambda x: x[..., 3:]),
+    **{image: (image, lambda x: x) for image in RAW_IMAGES["minimal"]},
 }
+_SLOW: _Pixels = {
+    "rgb": (COLOR, lambda x: _scaled(x, 255, torch.uint8)),
+    "depth": ("Position", lambda x: -_scaled(x, 1000, torch.int16)[..., 2:]),
+    "position": ("Position", lambda x: _scaled(x, 1000, torch.int16)),
+    "segmentation": ("Segmentation", lambda x: x[..., 1:2].astype(np.int64)),
+    "normal": ("Normal", lambda x: x[..., :3]),
+    "albedo": ("Albedo", lambda x: _scaled(x, 255, torch.uint8)),
+    COLOR: (COLOR, lambda x: x),
+    "Position": ("Position", lambda x: x),
+    "Segmentation": ("Segmentation", lambda x: x.astype(np.int64)),
+}
+_PIXELS = {"minimal": _QUICK, "default": _SLOW, **dict.fromkeys(RAY_TRACING, _SLOW)}
 
 Drawn = Callable[[], list[View]]
 """Waits until pictures are drawn, and returns what each camera sees."""
@@ -225,9 +226,13 @@ class Studio:
 
     def _add_camera(self, shaders: str, *key: Any) -> Any:
         # Process-wide, bound when a camera is made; others in this process may have changed them.
-        sapien.render.set_camera_shader_dir(shaders)
-        for image, pixels in _FORMATS[shaders].items():
+        sapien.render.set_camera_shader_dir("rt" if shaders in RAY_TRACING else shaders)
+        for image, pixels in _FORMATS.get(shaders, {}).items():
             sapien.render.set_picture_format(image, pixels)
+        if rays := RAY_TRACING.get(shaders):
+            sapien.render.set_ray_tracing_samples_per_pixel(rays[0])
+            sapien.render.set_ray_tracing_path_depth(rays[1])
+            sapien.render.set_ray_tracing_denoiser("optix")
         *lens, intrinsic = key
         camera = self._scene.add_camera(*lens)
         if intrinsic is not None:
