@@ -51,7 +51,8 @@ def _links(layout: Layout, arm: str, links: Any) -> tuple[str, ...]:
         if (fingers := known[arm].robot.fingers) is None:
             raise TaskError(f"touch of {arm!r} is True, but its fingers are not known; name links")
         return fingers.links
-    if not isinstance(links, Sequence) or isinstance(links, str) or not links:
+    named = isinstance(links, Sequence) and not isinstance(links, str) and bool(links)
+    if not named or not all(isinstance(link, str) for link in links):
         raise TaskError(f"touch of {arm!r} is {shown(links)}; True, or names of links are needed")
     if len(set(links)) < len(links):
         raise TaskError(f"touch of {arm!r} names a link twice: {shown(links)}")

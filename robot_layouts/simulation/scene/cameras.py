@@ -178,7 +178,7 @@ def checked_intrinsic(what: str, value: Any) -> Intrinsic:
     """
     try:
         rows = np.array(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError, RuntimeError):
         rows = np.empty(0)
     if rows.shape == (3, 3) and np.isfinite(rows).all() and np.abs(rows).max() <= FAR:
         (fx, skew, _), (below, fy, _), last = rows.tolist()
