@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,10 +52,12 @@ class Cameras:
 
         Raises:
             SimulationError: If the worlds have no visuals, or ``eye`` and ``target`` coincide.
+            UnknownNameError: If it rides on a robot, or a link of it, that is not there.
         """
         _expect_visuals(simulation)
         self._simulation = simulation
         self._view = camera or Camera(eye, target, "view", SIZE, SIZE, FIELD_OF_VIEW)
+        _expect_mounts(simulation, [self._view])
 
     def take(self) -> NDArray[np.uint8]:
         """Return what every camera sees now, (N, H, W, 3).
@@ -92,10 +94,7 @@ class Observers:
         """
         _expect_visuals(simulation)
         self._simulation, self._cameras, self._textures = simulation, dict(cameras), tuple(textures)
-        for camera in self._cameras.values():
-            if on := ridden(camera):
-                simulation.index.robots[on[0]]
-                simulation.index.links[on[0]].expect(on[1])
+        _expect_mounts(simulation, self._cameras.values())
 
     def look(self, env: int) -> dict[str, View]:
         """Return what every camera sees in one world now, by its name.
@@ -116,6 +115,12 @@ class Observers:
         """
         finish = self._simulation.begin_look(env, self._cameras, self._textures, markers=False)
         return lambda: dict(zip(self._cameras, finish(), strict=True))
+
+
+def _expect_mounts(simulation: Simulation, cameras: Iterable[AnyCamera]) -> None:
+    for on in filter(None, map(ridden, cameras)):
+        simulation.index.robots[on[0]]
+        simulation.index.links[on[0]].expect(on[1])
 
 
 def _expect_visuals(simulation: Simulation) -> None:

@@ -219,6 +219,24 @@ def test_a_camera_checks_itself(fields: dict[str, Any], message: str):
 def test_a_mount_that_is_not_there(mount: tuple[str, str], message: str):
     with pytest.raises(RobotLayoutsError, match=message):
         reset(cameras=[Camera(EYE, TARGET, mount=mount)])
+    making = {"render_mode": "rgb_array", "human_render_camera_configs": {"mount": mount}}
+    with (
+        closing(tasks.make(TASK, **making)) as env,
+        pytest.raises(RobotLayoutsError, match=message),
+    ):
+        env.render()
+
+
+@drawing
+def test_people_see_through_a_camera_on_a_link():
+    configs = {"mount": ("arm", "panda_hand"), "pose": [0.1, 0, 0, 0.7071, 0, -0.7071, 0]}
+    making = {"render_mode": "rgb_array", "human_render_camera_configs": configs}
+    with closing(tasks.make(TASK, **making)) as env:
+        env.reset(seed=0)
+        before = env.render()
+        env.step(np.ones((1, 8), np.float32))
+        assert before.std() > 10
+        assert (env.render() != before).any()
 
 
 def test_shaders_that_do_not_tell_what_is_asked_for():
