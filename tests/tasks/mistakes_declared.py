@@ -132,8 +132,8 @@ MISTAKES = (
         dict(cameras=Camera((0, 0, 1.0), (0, 0, 0))),
         (
             "Tray.cameras is Camera(eye=(0.0, 0.0, 1.0), target=(0....ount=None, "
-            "intrinsic=None, shader=None); a tuple of tasks.Camera is needed, such as (Camera((0.3, 0, "
-            "0.6), (0, 0, 0.1)),) with its comma"
+            "intrinsic=None, shader=None); a tuple of tasks.Camera is needed, such as "
+            "(Camera((0.3, 0, 0.6), (0, 0, 0.1)),) with its comma"
         ),
     ),
     Mistake(
