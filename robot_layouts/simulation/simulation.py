@@ -48,9 +48,9 @@ class Simulation:
         *,
         control_frequency: float = 20.0,
         visuals: bool = False,
-        shadows: bool = False,
         links_pass: bool = False,
         simulator: str = "sapien3",
+        shadows: bool = False,
     ) -> None:
         """Build the worlds.
 
@@ -61,9 +61,9 @@ class Simulation:
             physics: Solver settings; None keeps SAPIEN's own defaults.
             control_frequency: Control steps per second (Hz).
             visuals: Whether to build what pictures need.
-            shadows: Whether the first light casts shadows in them.
             links_pass: See `robot_layouts.simulation.World`.
             simulator: What simulates them, one of `robot_layouts.simulation.backend.SIMULATORS`.
+            shadows: Whether the first light casts shadows in pictures.
 
         Raises:
             SimulationError: If a control step is not a whole number of physics steps.
@@ -73,9 +73,10 @@ class Simulation:
         self.substeps = substeps(physics or SAPIEN_DEFAULTS, control_frequency)
         self.layout, self.num_envs = layout, num_envs
         self._everywhere: Sequence[int] = range(num_envs)
-        self._physics, self._visuals, self._shadows = physics, visuals, shadows
+        self._physics, self._visuals = physics, visuals
         self.links_pass = links_pass
         self.backend: Backend = open_backend(simulator)
+        self._shadows = shadows
         self._moment = Moment(self.backend)
         self._latest: State | None = None  # of this moment, if control modes look at it
         self._placements = Placements()
@@ -283,10 +284,10 @@ class Simulation:
             self.layout,
             self._physics,
             visuals=self._visuals,
-            shadows=self._shadows,
             number=index,
             placements=self._placements,
             links_pass=self.links_pass,
+            shadows=self._shadows,
         )
         build(world, index)
         return world

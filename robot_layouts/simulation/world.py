@@ -82,12 +82,12 @@ class World:
         layout: Which robots stand where.
         physics: Settings it is built with.
         visuals: Whether what pictures need is built.
-        shadows: Whether the first light casts shadows in them.
         bodies: Body by name.
         design: Geometry drawn for the coming episodes, if the task draws any.
         scales: Factor on the size of bodies, by name; 1 for those that are left out.
         links_pass: Whether links of two robots pass through each other where the robots' files let
             them pass through some of their own, as in ManiSkill; else robots always collide.
+        shadows: Whether the first light casts shadows in pictures.
     """
 
     def __init__(
@@ -96,10 +96,10 @@ class World:
         physics: PhysicsSettings | None = None,
         *,
         visuals: bool = False,
-        shadows: bool = False,
         number: int = 0,
         placements: Placements | None = None,
         links_pass: bool = False,
+        shadows: bool = False,
     ) -> None:
         """Begin without bodies.
 
@@ -107,18 +107,19 @@ class World:
             layout: Which robots stand where.
             physics: Solver settings; None keeps SAPIEN's own defaults.
             visuals: Whether to build what pictures need (a Vulkan driver must be present).
-            shadows: See the attribute.
             number: Its number among the worlds of a simulation.
             placements: Where that simulation looks for what is placed.
             links_pass: See the attribute.
+            shadows: See the attribute.
         """
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
-        self.visuals, self.shadows = visuals, shadows
+        self.visuals = visuals
         self.bodies: dict[str, WorldBody] = {}
         self.design: Any = None
         self.scales: Mapping[str, float] = {}
         self.links_pass = links_pass
+        self.shadows = shadows
         self._number = number
         self._placements = Placements() if placements is None else placements
 

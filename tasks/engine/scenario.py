@@ -60,7 +60,15 @@ class Scenario:
             of the robots come after.
         camera_size: Width and height (pixels) of what all these cameras see; None: each camera's
             own.
-        sensor_configs: What of these cameras is otherwise, as in native: of all of them ``width``,
+        simulator: ``"sapien3"``.
+        bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
+            take no action number, or ``"act"``, with action numbers of their own. None refuses
+            them.
+        randomization: What varies from episode to episode; None for nothing. See
+            `tasks.Randomization`.
+        check_layout: Whether to refuse a layout whose robots collide, be it another one or the
+            task's own; those of this library's tasks are checked by its tests.
+        sensor_configs: What of the cameras that observe is otherwise, as in native: of all of them ``width``,
             ``height`` (pixels), ``fov`` (rad) or ``intrinsic`` (3, 3), ``near``, ``far`` (m),
             ``pose`` (position and quaternion, wxyz, of the world or of the link), ``mount`` (robot
             and link) and ``shader_pack`` (``"minimal"``, ``"default"``, ``"rt"``, ``"rt-med"`` or
@@ -72,14 +80,6 @@ class Scenario:
             from arms to names of links, or to True for their fingers. Each link's contact force is
             a part of the observation, ``left.touch.panda_leftfinger``, (N, 3) (N), in the link's
             frame. None for none, as in native.
-        simulator: ``"sapien3"``.
-        bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
-            take no action number, or ``"act"``, with action numbers of their own. None refuses
-            them.
-        randomization: What varies from episode to episode; None for nothing. See
-            `tasks.Randomization`.
-        check_layout: Whether to refuse a layout whose robots collide, be it another one or the
-            task's own; those of this library's tasks are checked by its tests.
     """
 
     layout: Layout
@@ -94,14 +94,14 @@ class Scenario:
     headless: bool = True
     cameras: Sequence[Camera] = field(default_factory=list[Camera])
     camera_size: tuple[int, int] | None = None
-    sensor_configs: Mapping[str, Any] | None = None
-    human_render_camera_configs: Mapping[str, Any] | None = None
-    enable_shadow: bool = False
-    touch: bool | Mapping[str, Sequence[str] | bool] | None = None
     simulator: str = "sapien3"
     bystanders: str | None = None
     randomization: Randomization | None = None
     check_layout: bool = True
+    sensor_configs: Mapping[str, Any] | None = None
+    human_render_camera_configs: Mapping[str, Any] | None = None
+    enable_shadow: bool = False
+    touch: bool | Mapping[str, Sequence[str] | bool] | None = None
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse fields that a scenario does not have."""
@@ -180,14 +180,14 @@ class ScenarioFields(TypedDict, total=False):
     headless: bool
     cameras: Sequence[Camera]
     camera_size: tuple[int, int] | None
-    sensor_configs: Mapping[str, Any] | None
-    human_render_camera_configs: Mapping[str, Any] | None
-    enable_shadow: bool
-    touch: bool | Mapping[str, Sequence[str] | bool] | None
     simulator: str
     check_layout: bool
     bystanders: str | None
     randomization: Randomization | None
+    sensor_configs: Mapping[str, Any] | None
+    human_render_camera_configs: Mapping[str, Any] | None
+    enable_shadow: bool
+    touch: bool | Mapping[str, Sequence[str] | bool] | None
 
 
 class MakingFields(ScenarioFields, total=False):

@@ -65,10 +65,10 @@ class _ProvenanceMaking(TypedDict):
     camera_size: Annotated[list[Annotated[int, whole(1, _MOST)]], length(2)] | None
     bystanders: Name | None
     simulator: Name
+    num_envs: NotRequired[Annotated[int, whole(1, _MOST)]]
     sensor_configs: NotRequired[Object]
     enable_shadow: NotRequired[bool]
     touch: NotRequired[bool | Object]
-    num_envs: NotRequired[Annotated[int, whole(1, _MOST)]]
 
 
 def describe_making(
@@ -101,12 +101,12 @@ def describe_making(
         "camera_size": scenario.camera_size,
         "bystanders": scenario.bystanders,
         "simulator": scenario.simulator,
+        **({} if num_envs is None else {"num_envs": num_envs}),
         **_filled(
             sensor_configs=plain(scenario.sensor_configs),
             enable_shadow=scenario.enable_shadow,
             touch=plain(scenario.touch),
         ),
-        **({} if num_envs is None else {"num_envs": num_envs}),
     }
     return json.loads(json.dumps(described))
 
