@@ -30,6 +30,7 @@ def make_native(
     obs_mode: str = "state",
     robot_uid: str | None = None,
     sensors: Mapping[str, Any] | None = None,
+    **more: Any,
 ) -> Any:
     """Make the native environment of a task: one environment, CPU physics.
 
@@ -41,6 +42,7 @@ def make_native(
         obs_mode: What it observes, in native's words.
         robot_uid: Native's name of its robot; None takes the task's own.
         sensors: Native's ``sensor_configs``; None takes the cameras as they are.
+        more: Other arguments of native's.
 
     Raises:
         MissingPackageError: If mani_skill, or a package that it needs, is not installed.
@@ -50,7 +52,7 @@ def make_native(
     with quiet():
         gym = _import_native()
         _expect_task(task_id, reward_mode)
-        chosen: dict[str, Any] = {} if reward_mode is None else {"reward_mode": reward_mode}
+        chosen = {**more, **({} if reward_mode is None else {"reward_mode": reward_mode})}
         if robot_uid is not None:
             chosen["robot_uids"] = robot_uid
         if sensors is not None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from rich import box
 from rich.console import RenderableType
@@ -17,7 +17,7 @@ from rich.table import Table
 
 from layouts import Layout
 from robot_layouts.simulation import Camera
-from robot_layouts.simulation.scene.cameras import RobotCamera
+from robot_layouts.simulation.scene.cameras import AnyCamera, field_of_view, lens_of, ridden
 from robots import TaskError
 from tasks.engine.cameras import cameras_of
 from tasks.engine.env import MultiRobotTask, TaskEnv
@@ -282,16 +282,22 @@ def observation_table(slices: dict[str, slice], senses: Callable[[str], bool]) -
     return rows
 
 
-def camera_table(cameras: Mapping[str, Camera | RobotCamera]) -> Table:
+def camera_table(cameras: Mapping[str, AnyCamera]) -> Table:
     """Return one row per camera: where it is, and how large and wide its images are."""
     rows = _table("camera", "place", "pixels", "view", numbers=(2, 3))
     for name, camera in cameras.items():
-        if isinstance(camera, RobotCamera):
-            lens, place = camera.mount, f"on {camera.robot}, link {camera.mount.link}"
+        if on := ridden(camera):
+            place = f"on {on[0]}, link {on[1]}"
         else:
-            lens, place = camera, f"at {_point(camera.eye)}, towards {_point(camera.target)} m"
-        rows.add_row(name, place, f"{lens.width} × {lens.height}", f"{degrees(lens.fov):.0f}°")
+            place = _standing(cast("Camera", camera))
+        lens, view = lens_of(camera), degrees(field_of_view(camera))
+        rows.add_row(name, place, f"{lens.width} × {lens.height}", f"{view:.0f}°")
     return rows
+
+
+def _standing(camera: Camera) -> str:
+    way = f"turned by {_point(camera.quaternion)}" if camera.quaternion else ""
+    return f"at {_point(camera.eye)}, {way or f'towards {_point(camera.target or ())} m'}"
 
 
 def _point(place: Sequence[float]) -> str:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.writing import written_whole
 from robot_layouts.simulation.rendering import FIELD_OF_VIEW
-from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
+from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, camera_name, lens_of
 from robots import MissingPackageError, TaskError, UnknownNameError
-from tasks.engine.cameras import cameras_of, resized
+from tasks.engine.cameras import cameras_of, configured, resized
 from tasks.engine.env import TaskEnv
 
 SUPPORTED = (".png", ".jpg", ".webp")
@@ -105,6 +105,7 @@ def expect_format(path: str | os.PathLike[str]) -> Path:
 def _camera(task: TaskEnv, name: str | None) -> AnyCamera:
     """Return the camera that a name means; see `draws`."""
     cameras = cameras_of(task.layout, task.scenario.cameras or task.cameras)
+    cameras = configured(cameras, task.scenario.sensor_configs or {}, "sensor_configs")
     known = {camera_name(camera): camera for camera in cameras.values()}
     if name is not None and name not in known:
         raise UnknownNameError(f"camera of {task.task_class.__name__}", name, known)
@@ -117,7 +118,7 @@ def _camera(task: TaskEnv, name: str | None) -> AnyCamera:
 
 def _enlarged(camera: AnyCamera) -> AnyCamera:
     """Return a camera with pictures as high as those of a preview, and as wide for their height."""
-    lens = camera.mount if isinstance(camera, RobotCamera) else camera
+    lens = lens_of(camera)
     return resized(camera, (round(lens.width * _HEIGHT / lens.height), _HEIGHT))
 
 

@@ -59,11 +59,14 @@ class Velocity(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """A link and a body, and the contact force of the body on the link (N, world frame)."""
+    """A link and a body, and the contact force of the body on the link (N, world frame).
+
+    Without a body it is the force of everything that touches the link.
+    """
 
     robot: str
     link: str
-    body: str
+    body: str | None
 
 
 class Overlap(NamedTuple):

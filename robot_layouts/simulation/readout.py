@@ -175,10 +175,11 @@ class ReadoutIndex:
         self.bodies.expect(body)
         return self.velocities.number(Velocity(body, kind))
 
-    def force(self, robot: str, link: str, body: str) -> int:
+    def force(self, robot: str, link: str, body: str | None) -> int:
         """Return the number of the force of a body on a link, declaring it if it is new."""
         self.links[robot].expect(link)
-        self.bodies.expect(body)
+        if body is not None:
+            self.bodies.expect(body)
         return self.forces.number(Pair(self._owners[robot], link, body))
 
     def grasp(self, robot: str, body: str) -> NDArray[np.intp]:

@@ -5,18 +5,23 @@ from __future__ import annotations
 import functools
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, RobotCamera, Texture, View
+from robot_layouts.simulation.scene.cameras import (
+    FIELD_OF_VIEW,
+    SIZE,
+    AnyCamera,
+    Camera,
+    Texture,
+    View,
+    ridden,
+)
 from robot_layouts.simulation.simulation import Simulation
 from robots import SimulationError
 from robots.descriptor import Vector3
-
-SIZE = 512  # pixels along each side of a picture for people
-FIELD_OF_VIEW = 1.0  # rad, vertical
 
 _PROBE = "import sapien; from sapien.render import RenderSystem; sapien.Scene([RenderSystem()])"
 _PROBE_SECONDS = 60
@@ -29,23 +34,33 @@ class Cameras:
     world changes nothing in it.
     """
 
-    def __init__(self, simulation: Simulation, eye: Vector3, target: Vector3) -> None:
+    def __init__(
+        self,
+        simulation: Simulation,
+        eye: Vector3,
+        target: Vector3,
+        *,
+        camera: Camera | None = None,
+    ) -> None:
         """Set a camera up in every world.
 
         Args:
             simulation: Worlds that were built with visuals.
             eye: Where the cameras are (m, world).
             target: The point in the middle of the picture (m, world).
+            camera: Another camera than one of 512 × 512 pixels there.
 
         Raises:
             SimulationError: If the worlds have no visuals, or ``eye`` and ``target`` coincide.
+            UnknownNameError: If it rides on a robot, or a link of it, that is not there.
         """
         _expect_visuals(simulation)
         self._simulation = simulation
-        self._view = Camera(eye, target, "view", SIZE, SIZE, FIELD_OF_VIEW)
+        self._view = camera or Camera(eye, target, "view", SIZE, SIZE, FIELD_OF_VIEW)
+        _expect_mounts(simulation, [self._view])
 
     def take(self) -> NDArray[np.uint8]:
-        """Return what every camera sees now, (N, 512, 512, 3).
+        """Return what every camera sees now, (N, H, W, 3).
 
         Raises:
             SimulationError: If this process is a fork of one that drew.
@@ -75,13 +90,11 @@ class Observers:
 
         Raises:
             SimulationError: If the worlds have no visuals.
-            UnknownNameError: If a robot has not the link that its camera rides on.
+            UnknownNameError: If a camera rides on a robot, or a link of it, that is not there.
         """
         _expect_visuals(simulation)
         self._simulation, self._cameras, self._textures = simulation, dict(cameras), tuple(textures)
-        for camera in self._cameras.values():
-            if isinstance(camera, RobotCamera):
-                simulation.index.links[camera.robot].expect(camera.mount.link)
+        _expect_mounts(simulation, self._cameras.values())
 
     def look(self, env: int) -> dict[str, View]:
         """Return what every camera sees in one world now, by its name.
@@ -102,6 +115,12 @@ class Observers:
         """
         finish = self._simulation.begin_look(env, self._cameras, self._textures, markers=False)
         return lambda: dict(zip(self._cameras, finish(), strict=True))
+
+
+def _expect_mounts(simulation: Simulation, cameras: Iterable[AnyCamera]) -> None:
+    for on in filter(None, map(ridden, cameras)):
+        simulation.index.robots[on[0]]
+        simulation.index.links[on[0]].expect(on[1])
 
 
 def _expect_visuals(simulation: Simulation) -> None:

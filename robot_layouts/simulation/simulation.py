@@ -50,6 +50,7 @@ class Simulation:
         visuals: bool = False,
         links_pass: bool = False,
         simulator: str = "sapien3",
+        shadows: bool = False,
     ) -> None:
         """Build the worlds.
 
@@ -62,6 +63,7 @@ class Simulation:
             visuals: Whether to build what pictures need.
             links_pass: See `robot_layouts.simulation.World`.
             simulator: What simulates them, one of `robot_layouts.simulation.backend.SIMULATORS`.
+            shadows: Whether the first light casts shadows in pictures.
 
         Raises:
             SimulationError: If a control step is not a whole number of physics steps.
@@ -74,6 +76,7 @@ class Simulation:
         self._physics, self._visuals = physics, visuals
         self.links_pass = links_pass
         self.backend: Backend = open_backend(simulator)
+        self._shadows = shadows
         self._moment = Moment(self.backend)
         self._latest: State | None = None  # of this moment, if control modes look at it
         self._placements = Placements()
@@ -284,6 +287,7 @@ class Simulation:
             number=index,
             placements=self._placements,
             links_pass=self.links_pass,
+            shadows=self._shadows,
         )
         build(world, index)
         return world

@@ -302,8 +302,14 @@ class State:
 
     # -- contacts ----------------------------------------------------------------------------
 
-    def contact_force(self, robot: str, link: str, body: str) -> Floats:
-        """Sum of the contact forces of a body on a link, shape (N, 3) (N, world frame)."""
+    def contact_force(self, robot: str, link: str, body: str | None = None) -> Floats:
+        """Sum of the contact forces of a body on a link, shape (N, 3) (N, world frame).
+
+        Args:
+            robot: Robot name.
+            link: Link name.
+            body: Body name; None sums the forces of all that touches the link, links as well.
+        """
         number = self._index.force(robot, link, body)
         forces = self._all_forces(number)
         return np.zeros((self.num_envs, 3), np.float32) if forces is None else forces[number]

@@ -87,6 +87,7 @@ class World:
         scales: Factor on the size of bodies, by name; 1 for those that are left out.
         links_pass: Whether links of two robots pass through each other where the robots' files let
             them pass through some of their own, as in ManiSkill; else robots always collide.
+        shadows: Whether the first light casts shadows in pictures.
     """
 
     def __init__(
@@ -98,6 +99,7 @@ class World:
         number: int = 0,
         placements: Placements | None = None,
         links_pass: bool = False,
+        shadows: bool = False,
     ) -> None:
         """Begin without bodies.
 
@@ -108,6 +110,7 @@ class World:
             number: Its number among the worlds of a simulation.
             placements: Where that simulation looks for what is placed.
             links_pass: See the attribute.
+            shadows: See the attribute.
         """
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
@@ -116,6 +119,7 @@ class World:
         self.design: Any = None
         self.scales: Mapping[str, float] = {}
         self.links_pass = links_pass
+        self.shadows = shadows
         self._number = number
         self._placements = Placements() if placements is None else placements
 

@@ -4,12 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
+
+import numpy as np
 
 from layouts import Layout
-from robot_layouts.core.bounds import checked_whole, shown
-from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, RobotCamera, camera_name
-from robots import TaskError
+from robot_layouts.core.bounds import FAR, checked_numbers, checked_whole, shown
+from robot_layouts.simulation.scene.cameras import (
+    DEFAULT_FOV,
+    FIELD_OF_VIEW,
+    SIZE,
+    AnyCamera,
+    Camera,
+    RobotCamera,
+    camera_name,
+    checked_mount,
+    lens_of,
+    ridden,
+)
+from robots import RobotLayoutsError, TaskError, UnknownNameError
+from robots.descriptor import IDENTITY, Vector3
 from tasks.native.format import observation_keys
 
 Size = tuple[int, int]
@@ -46,9 +60,146 @@ def resized(camera: AnyCamera, size: Size | None) -> AnyCamera:
     if size is None:
         return camera
     width, height = size
+    lens, intrinsic = lens_of(camera), camera.intrinsic
+    if intrinsic is not None:
+        (fx, _, cx), (_, fy, cy), last = intrinsic
+        scale = height / lens.height
+        middle = width / 2 + (cx - lens.width / 2) * scale
+        intrinsic = (fx * scale, 0.0, middle), (0.0, fy * scale, cy * scale), last
+    return _with(camera, intrinsic=intrinsic, width=width, height=height)
+
+
+Configs = Mapping[str, Any]
+"""What of cameras is otherwise, in the form of native's ``sensor_configs``."""
+
+_NUMBERS = ("width", "height", "fov", "near", "far")
+SETTINGS = (*_NUMBERS, "pose", "intrinsic", "shader_pack", "mount")
+"""What may be otherwise, in native's words; ``mount`` takes names, native's takes a link."""
+
+
+def configured(
+    cameras: Mapping[str, AnyCamera], configs: Configs, argument: str
+) -> dict[str, AnyCamera]:
+    """Return cameras with what of them is to be otherwise.
+
+    Args:
+        cameras: Camera by its name in observations.
+        configs: Settings of all cameras and, by a camera's name, mappings of its own, which come
+            after those. A camera also goes by its name by place: ``left.hand_camera``.
+        argument: What ``configs`` are called.
+
+    Raises:
+        TaskError: If a setting is invalid.
+        UnknownNameError: If there is no such camera or setting.
+    """
+    if not isinstance(configs, Mapping):
+        raise TaskError(f"{argument} is {shown(configs)}; a mapping of settings is needed")
+    places = {camera_name(camera): name for name, camera in cameras.items()}
+    own, common = dict[str, dict[str, Any]](), dict[str, Any]()
+    for key, value in configs.items():
+        if key in cameras or key in places:
+            if not isinstance(value, Mapping):
+                raise TaskError(
+                    f"{argument}[{key!r}] is {shown(value)}; a mapping of settings is needed, such"
+                    " as {'width': 64, 'height': 64}"
+                )
+            own.setdefault(key if key in cameras else places[key], {}).update(value)
+        elif key in SETTINGS:
+            common[key] = value
+        else:
+            known = [*dict.fromkeys((*cameras, *places)), *SETTINGS]
+            raise UnknownNameError(f"camera or setting in {argument}", key, known)
+    found: dict[str, AnyCamera] = {}
+    for name, camera in cameras.items():
+        what = f"{argument} of {name!r}"
+        for settings in (common, own.get(name, {})):
+            camera = _set(camera, settings, what)
+        found[name] = camera
+    return found
+
+
+def _set(camera: AnyCamera, settings: Mapping[str, Any], what: str) -> AnyCamera:
+    """Return a camera with other settings."""
+    for key in settings:
+        if key not in SETTINGS:
+            raise UnknownNameError(f"setting in {what}", key, SETTINGS)
+    fov, intrinsic = settings.get("fov"), settings.get("intrinsic")
+    if fov is not None and intrinsic is not None:
+        raise TaskError(f"{what} has both fov and intrinsic; it takes one of them")
+    changed: dict[str, Any] = {k: settings[k] for k in _NUMBERS if settings.get(k) is not None}
+    if fov is not None:
+        changed["intrinsic"] = None
+    elif intrinsic is not None:
+        changed |= {"intrinsic": intrinsic, "fov": DEFAULT_FOV}
+    if settings.get("shader_pack") is not None:
+        changed["shader"] = settings["shader_pack"]
+    if settings.get("pose") is not None:
+        changed["position"], changed["quaternion"] = _pose(f"{what}: pose", settings["pose"])
+    if settings.get("mount") is not None:
+        changed["on"] = checked_mount(f"{what}: mount", settings["mount"], TaskError)
+    try:
+        return _with(camera, **changed) if changed else camera
+    except RobotLayoutsError as error:
+        raise TaskError(f"{what}: {error}") from error
+
+
+def _pose(what: str, pose: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return a position (m) and a quaternion, wxyz, of seven numbers or of what has p and q."""
+    if hasattr(pose, "p") and hasattr(pose, "q"):  # sapien.Pose, or ManiSkill's of one environment
+        pose = [float(x) for part in (pose.p, pose.q) for x in np.ravel(part)]
+    numbers = checked_numbers(what, pose, 7, FAR, TaskError)
+    return numbers[:3], numbers[3:]
+
+
+def plain(settings: Any) -> Any:
+    """Return settings, such as `Configs`, as plain data of which the same cameras are made."""
+    if isinstance(settings, Mapping):
+        return {key: plain(value) for key, value in settings.items()}
+    if hasattr(settings, "p") and hasattr(settings, "q"):
+        position, quaternion = _pose("pose", settings)
+        return [*position, *quaternion]
+    if hasattr(settings, "tolist"):  # an array or a tensor
+        return settings.tolist()
+    if isinstance(settings, (tuple, list)):
+        return [plain(value) for value in settings]
+    return settings
+
+
+def _with(camera: AnyCamera, **changed: Any) -> AnyCamera:
+    """Return a camera of which something is otherwise: ``position``, ``on`` and fields of it."""
     if isinstance(camera, RobotCamera):
-        return replace(camera, mount=replace(camera.mount, width=width, height=height))
-    return replace(camera, width=width, height=height)
+        own = {name: changed.pop(name) for name in ("intrinsic", "shader") if name in changed}
+        robot, changed["link"] = changed.pop("on", ridden(camera))
+        if robot != camera.robot:
+            raise TaskError(
+                f"{camera_name(camera)} is a camera of {camera.robot!r} and cannot ride on"
+                f" {robot!r}; a Camera in cameras=[…] can"
+            )
+        return replace(camera, mount=replace(camera.mount, **changed), **own)
+    for name, field in (("position", "eye"), ("on", "mount")):
+        if name in changed:
+            changed[field] = changed.pop(name)
+    if "quaternion" in changed:
+        changed["target"] = None
+    elif "mount" in changed:  # at the link's own frame
+        changed |= {"eye": (0.0, 0.0, 0.0), "quaternion": IDENTITY, "target": None}
+    return replace(camera, **changed)
+
+
+def camera_for_people(viewpoint: tuple[Vector3, Vector3], configs: Configs) -> Camera:
+    """Return the camera that draws a task for people.
+
+    Args:
+        viewpoint: Its position and target (m, world).
+        configs: What of it is otherwise; see `tasks.Scenario.human_render_camera_configs`.
+
+    Raises:
+        TaskError: If a setting is invalid.
+        UnknownNameError: If there is no such camera or setting.
+    """
+    camera = Camera(*viewpoint, "render_camera", SIZE, SIZE, FIELD_OF_VIEW)
+    found = configured({camera.name: camera}, configs, "human_render_camera_configs")
+    return cast("Camera", found[camera.name])
 
 
 def checked_size(what: str, value: Any) -> Size:

@@ -14,10 +14,11 @@ from torch import Tensor
 
 from robot_layouts.core.processes.start import preload
 from robot_layouts.simulation import Simulation, State, World
-from robot_layouts.simulation.maths import Floats, all_finite
+from robot_layouts.simulation.maths import Array, Floats, all_finite
 from robot_layouts.simulation.scene.parts import Part
 from robots import SimulationError, TaskError
 from tasks.engine.actions import ActionReader
+from tasks.engine.cameras import camera_for_people
 from tasks.engine.checks import (
     ELAPSED,
     ReturnedArrays,
@@ -44,6 +45,7 @@ from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisio
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario
 from tasks.engine.task import Info, Memory, Task
+from tasks.engine.touch import Touch, touch_links
 from tasks.language.randomness import EpisodeRandom
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.randomization.distractors import add_distractors, area_of
@@ -147,11 +149,21 @@ class TaskEnv(Remade):
         self.action_space = Box(np.tile(low, rows), np.tile(high, rows), dtype=np.float32)
         self._reader = ActionReader(self.layout, self.num_envs)
         observed = read_mode(scenario.obs_mode)
+        self._touch = Touch(touch_links(layout, scenario.touch))
         cameras = scenario.cameras or task.cameras
         size = scenario.camera_size
-        shown = scenario.render_mode in SENSOR_RENDER_MODES
         self.observer = Observer(
-            layout, observed, cameras, task.sensed, task.viewpoint, size, shown=shown
+            layout,
+            observed,
+            cameras,
+            (*task.sensed, *self._touch.names),
+            task.viewpoint,
+            size,
+            configs=scenario.sensor_configs,
+            shown=scenario.render_mode in SENSOR_RENDER_MODES,
+        )
+        self._for_people = camera_for_people(
+            task.viewpoint, scenario.human_render_camera_configs or {}
         )
         first = task.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
@@ -170,6 +182,7 @@ class TaskEnv(Remade):
             scenario.physics,
             control_frequency=scenario.control_frequency,
             visuals=scenario.draws,
+            shadows=scenario.enable_shadow,
             links_pass=task.native_id is not None,
             simulator=scenario.simulator,
         )
@@ -395,15 +408,16 @@ class TaskEnv(Remade):
     def flat_state(self) -> Floats:
         """Return what ``obs_mode="state"`` observes, (N, D), whatever the task's own mode is."""
         state = self._state
-        parts = self.task.observe(state, self._info(state))
+        parts = self._parts(state, self._info(state))
         observer = Observer(self.layout, read_mode("state"), (), (), self.task.viewpoint)
         return observer.observe(self.simulation, state, parts)
 
     def render(self) -> np.ndarray:
         """Return a picture of every environment, (N, H, W, 3) uint8.
 
-        With ``render_mode="rgb_array"`` it is one for people, 512 pixels wide and high; with
-        ``"sensors"`` what each camera sees, in colours, side by side; with ``"all"`` both.
+        With ``render_mode="rgb_array"`` it is one for people, 512 pixels wide and high unless
+        ``human_render_camera_configs`` say otherwise; with ``"sensors"`` what each camera sees, in
+        colours, side by side; with ``"all"`` both.
 
         Raises:
             TaskError: If the task was made without a ``render_mode``.
@@ -415,7 +429,8 @@ class TaskEnv(Remade):
             if self._camera is None:
                 from robot_layouts.simulation.rendering import Cameras
 
-                self._camera = Cameras(self.simulation, *self.task.viewpoint)
+                view = self._for_people
+                self._camera = Cameras(self.simulation, *self.task.viewpoint, camera=view)
             pictures.append(self._camera.take())
         if mode in SENSOR_RENDER_MODES:
             pictures += self.observer.pictures(self.simulation)
@@ -492,7 +507,7 @@ class TaskEnv(Remade):
         with unchanged(state, f"{name}.evaluate()"):
             info = self._info(state)
         with unchanged(state, f"{name}.observe()"):
-            parts = {} if mode.nothing else self._observed.checked(self.task.observe(state, info))
+            parts = {} if mode.nothing else self._parts(state, info)
         self.observation_slices = self.observer.slices(self.simulation, state, parts)
         self.single_observation_space = space_of(self.start[0], batched=True)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -513,12 +528,19 @@ class TaskEnv(Remade):
             info |= {f"{arm}.shortfall": rows.copy() for arm, rows in modes.shortfalls.items()}
         return info
 
+    def _parts(self, state: State, info: Info) -> Mapping[str, Array]:
+        """Return the named parts of the observation: those of the task, and what links feel."""
+        parts = self._observed.checked(self.task.observe(state, info))
+        if not self._touch.names:
+            return parts
+        return {**parts, **self._touch.read(state, self._elapsed)}
+
     def _observation(self, state: State, info: Info, ids: Sequence[int]) -> Any:
         """Return what is observed of all environments, of which those in ``ids`` have moved."""
         mode = self.observer.mode
         if mode.nothing:
             return {}
-        parts = {} if mode.columns else self._observed.checked(self.task.observe(state, info))
+        parts = {} if mode.columns else self._parts(state, info)
         randomizer = self._randomizer
         try:
             if randomizer is None:

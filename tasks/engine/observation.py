@@ -17,12 +17,13 @@ from robot_layouts.simulation.scene.cameras import (
     RAW,
     SHADERS,
     TEXTURES,
-    RobotCamera,
     camera_name,
+    ridden,
     shaders_for,
+    told_by,
 )
 from robots import TaskError, unknown_name_message
-from tasks.engine.cameras import Size, cameras_of, expect_apart, resized
+from tasks.engine.cameras import Configs, Size, cameras_of, configured, expect_apart, resized
 from tasks.engine.columns import (
     COLUMN_MODES,
     FILMED,
@@ -49,6 +50,7 @@ class ObservationMode:
 
     Attributes:
         textures: What cameras record of each pixel, in native's order; None if none observes.
+            `RAW` alone stands for the images that their shaders store.
         flat: Whether everything but images is one flat part.
         privileged: Whether it includes what only a simulation knows.
         points: Whether images are observed as points of the world.
@@ -72,7 +74,7 @@ class ObservationMode:
     @property
     def shown(self) -> tuple[str, ...]:
         """What of it people are shown as colours; if that is nothing, colours and depth."""
-        textures = SHADERS["minimal"] if self.textures == RAW else self.textures or ()
+        textures = SHADERS["minimal"] if self.textures == (RAW,) else self.textures or ()
         return tuple(filter(SHOWN.__contains__, textures)) or ("rgb", "depth")
 
 
@@ -88,7 +90,7 @@ MODES = {
     },
     "rgbd": ObservationMode(("rgb", "depth"), privileged=False),
     "pointcloud": ObservationMode(POINTS, privileged=False, points=True),
-    "sensor_data": ObservationMode(RAW, privileged=False),
+    "sensor_data": ObservationMode((RAW,), privileged=False),
 }
 """The modes that are no textures and forms of state joined by ``+``."""
 
@@ -136,6 +138,7 @@ class Observer:
         viewpoint: Viewpoint,
         size: Size | None = None,
         *,
+        configs: Configs | None = None,
         shown: bool = False,
     ) -> None:
         """Remember how to observe.
@@ -147,18 +150,24 @@ class Observer:
             sensed: See `tasks.MultiRobotTask`.
             viewpoint: From where people see the task.
             size: Width and height of all pictures (pixels); None: each camera's own.
+            configs: What of them is otherwise; see `tasks.Scenario.sensor_configs`.
             shown: Whether people are shown what the cameras see.
 
         Raises:
             TaskError: If images are asked for, to observe or to show, and there is no camera, or
-                two have the same name.
+                two have the same name, or ``configs`` are invalid.
+            SimulationError: If a camera's shaders do not tell what is asked for.
         """
         self.mode = mode
         looks = shown or mode.textures is not None
-        found = cameras_of(layout, cameras) if looks else {}
-        self.cameras = {name: resized(camera, size) for name, camera in found.items()}
-        if looks and not self.cameras:
+        found = cameras_of(layout, cameras) if looks or configs else {}
+        found = {name: resized(camera, size) for name, camera in found.items()}
+        found = configured(found, configs or {}, "sensor_configs")
+        self.cameras = found if looks else {}
+        if looks and not found:
             raise TaskError("there is no camera: the task declares none, nor do its robots")
+        for camera in self.cameras.values():
+            told_by(camera, mode.textures or ())
         self._keys, self._robots, self._sensed = observation_keys(layout), tuple(layout), sensed
         self._rigs: dict[tuple[str, ...], CameraRig] = {}  # by what they take
         self._columns = ColumnObserver(layout, mode.columns, viewpoint) if mode.columns else None
@@ -224,7 +233,7 @@ class Observer:
         return [
             name
             for name, camera in self.cameras.items()
-            if not isinstance(camera, RobotCamera) or camera.robot == robot
+            if (on := ridden(camera)) is None or on[0] == robot
         ]
 
     def changed(self, env_ids: Iterable[int]) -> None:

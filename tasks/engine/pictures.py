@@ -27,7 +27,6 @@ class CameraRig:
     """The latest images of every environment; only those that changed are drawn again.
 
     Attributes:
-        textures: What the cameras take.
         stale: The environments that changed since they were drawn.
     """
 
@@ -42,7 +41,6 @@ class CameraRig:
             Observers,  # loaded with the first picture
         )
 
-        self.textures = tuple(textures)
         self._observers: Observers = Observers(simulation, cameras, textures)
         self._rows: list[dict[str, View]] = [{}] * simulation.num_envs
         self.stale = set(range(simulation.num_envs))
@@ -62,7 +60,7 @@ class CameraRig:
             "sensor_data": {
                 name: {
                     texture: _stacked(row[name].images[texture] for row in self._rows)
-                    for texture in self.textures
+                    for texture in self._rows[0][name].images
                 }
                 for name in names
             },

@@ -19,6 +19,7 @@ from robots import TaskError, UnknownNameError
 from tasks.engine.cameras import checked_size
 from tasks.engine.display import scenario_html, scenario_text
 from tasks.engine.observation import read_mode
+from tasks.engine.touch import touch_links
 from tasks.language.needs import ACT, HOLD
 from tasks.randomization.declaration import Randomization
 
@@ -67,6 +68,18 @@ class Scenario:
             `tasks.Randomization`.
         check_layout: Whether to refuse a layout whose robots collide, be it another one or the
             task's own; those of this library's tasks are checked by its tests.
+        sensor_configs: What of the cameras that observe is otherwise, as in native: of all of them ``width``,
+            ``height`` (pixels), ``fov`` (rad) or ``intrinsic`` (3, 3), ``near``, ``far`` (m),
+            ``pose`` (position and quaternion, wxyz, of the world or of the link), ``mount`` (robot
+            and link) and ``shader_pack`` (``"minimal"``, ``"default"``, ``"rt"``, ``"rt-med"`` or
+            ``"rt-fast"``), and by a camera's name a mapping of its own.
+        human_render_camera_configs: Likewise of the camera that draws for people,
+            ``"render_camera"``.
+        enable_shadow: Whether the first light casts shadows, as in native.
+        touch: Which links feel what touches them: True for the fingers of all arms, or a mapping
+            from arms to names of links, or to True for their fingers. Each link's contact force is
+            a part of the observation, ``left.touch.panda_leftfinger``, (N, 3) (N), in the link's
+            frame. None for none, as in native.
     """
 
     layout: Layout
@@ -85,6 +98,10 @@ class Scenario:
     bystanders: str | None = None
     randomization: Randomization | None = None
     check_layout: bool = True
+    sensor_configs: Mapping[str, Any] | None = None
+    human_render_camera_configs: Mapping[str, Any] | None = None
+    enable_shadow: bool = False
+    touch: bool | Mapping[str, Sequence[str] | bool] | None = None
 
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse fields that a scenario does not have."""
@@ -137,8 +154,9 @@ class Scenario:
             checked_choice(name, getattr(self, name), choices, TaskError)
         if self.control_mode is not None:
             check_control_mode(self.layout, self.control_mode)
-        read_mode(self.obs_mode)
-        for name in ("check_layout", "headless"):
+        if read_mode(self.obs_mode).columns and touch_links(self.layout, self.touch):
+            raise TaskError(f"obs_mode {self.obs_mode!r} has no columns for touch")
+        for name in ("check_layout", "headless", "enable_shadow"):
             checked_flag(name, getattr(self, name), TaskError)
         if not self.headless:
             raise TaskError("headless=False is not offered: no window is opened; use render_mode")
@@ -166,6 +184,10 @@ class ScenarioFields(TypedDict, total=False):
     check_layout: bool
     bystanders: str | None
     randomization: Randomization | None
+    sensor_configs: Mapping[str, Any] | None
+    human_render_camera_configs: Mapping[str, Any] | None
+    enable_shadow: bool
+    touch: bool | Mapping[str, Sequence[str] | bool] | None
 
 
 class MakingFields(ScenarioFields, total=False):

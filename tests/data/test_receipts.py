@@ -1,5 +1,6 @@
 """A receipt is the same whoever plays, and holds all that it takes to play again."""
 
+import json
 import os
 import subprocess
 import sys
@@ -7,14 +8,20 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
 import pytest
+import sapien
 
 import tasks
 from robot_layouts.core.errors import UnwritableFileError
 from robot_layouts.data import Evaluation, evaluate
 from robot_layouts.data.receipts import Receipt, ReceiptError
+from robot_layouts.data.receipts.provenance import describe_making, make_again
+from robot_layouts.simulation import Camera
 from robots import TaskError
+from tasks.engine.cameras import cameras_of, configured
 from tasks.episode import REBUILT
+from tasks.registry import make_scenario
 from tests.data.policies import LEANS, TASK, Leans, Wanders
 from tests.data.receipt_files import NAMED, again, written
 
@@ -143,6 +150,27 @@ def test_everything_that_a_task_is_made_with_comes_back(tmp_path):
     assert making["layout"]["right"]["position"] == [0.8, 0.01, 0.0]
     assert making["control_mode"] == {"left": "pd_joint_pos"}
     assert making["randomization"] == {"mass": {"cube": {"uniform": [0.5, 2.0]}}}
+
+
+def test_what_cameras_and_links_sense_comes_back():
+    cls = tasks.get_task_class("TwoRobotPickCube-v1")
+    configs = {
+        "far": np.float32(50),
+        "base_camera": {"pose": sapien.Pose([0.6, 0.0, 0.4], [0.0, -0.6, 0.0, 0.8])},
+        "right.hand_camera": {"intrinsic": np.array([[80.0, 0, 48], [0, 80, 32], [0, 0, 1]])},
+    }
+    making = {"touch": {"left": True, "right": ("panda_hand",)}, "enable_shadow": True}
+    camera = Camera((0.0, 0.0, 0.1), mount=("left", "panda_hand"), quaternion=(1.0, 0.0, 0.0, 0.0))
+    scenario = make_scenario(cls, cameras=[camera], sensor_configs=configs, **making)
+    written = json.loads(json.dumps(describe_making(cls, scenario)))
+    back = make_scenario(cls, **make_again(written, {}, cls, {}))
+    assert (back.touch, back.enable_shadow) == ({"left": True, "right": ["panda_hand"]}, True)
+    assert [*back.cameras] == [camera]
+    cameras = cameras_of(cls.layout, cls.cameras)
+    made, again = (configured(cameras, s.sensor_configs, "") for s in (scenario, back))
+    assert made == again != cameras
+    plain = describe_making(cls, cls.scenario)
+    assert not {"sensor_configs", "enable_shadow", "touch"} & set(plain)
 
 
 def test_batched_policies_are_verified_as_many_at_once(tmp_path):

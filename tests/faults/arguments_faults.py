@@ -28,6 +28,24 @@ WRONG_FIELDS: dict[str, tuple[Any, ...]] = {
     "headless": (False, "yes"),
     "check_layout": ("no",),
     "cameras": (5, None, "base_camera", ["base_camera"], {1: 2}, [None], 2.5),
+    "sensor_configs": (5, "base_camera", ["base_camera"], {"base": {}}, {1: 2}, {"base_camera": 5})
+    + ({"fov": "wide"}, {"fov": {}}, {"width": True}, {"pose": (1, 2)}, {"pose": (INF,) * 7})
+    + (
+        {"intrinsic": "K"},
+        {"intrinsic": ((10**400,) * 3,) * 3},
+        {"mount": 5},
+        {"mount": ("arm", 5)},
+    )
+    + (
+        {"mount": ("arm", "palm")},
+        {"shader_pack": 5},
+        {"shader_pack": ["rt"]},
+        {"base_camera": {5: 1}},
+    ),
+    "human_render_camera_configs": (5, {"base_camera": {}}, {"render_camera": {"far": 0}}),
+    "enable_shadow": (5, "yes", None),
+    "touch": (5, "fingers", ["arm"], {"hand": True}, {5: True}, {"arm": 5}, {"arm": []})
+    + ({"arm": [5]}, {"arm": [[5]]}, {"arm": ["palm"]}, {"arm": ["panda_hand"] * 2}),
     "physics": (5, "fast", {"timestep": 0.01}, [], True),
     "layout": (5, "ring", {"arm": "panda"}, [], True),
     "robots": (5, ["panda"], ("panda",), {"panda"}, {"arm": 5}, {"arm": None}, {"hand": "panda"})
@@ -67,6 +85,10 @@ WRONG_CAMERA: dict[str, tuple[Any, ...]] = {
     "near": (None, 0, 1000.0),
     "far": (None, 1e-3, 1e308),
     "name": (None, 5, b"eye"),
+    "quaternion": (5, (1.0, 0.0, 0.0, 0.0)),
+    "mount": (5, "arm", ("arm",), ("arm", 5)),
+    "intrinsic": (5, "K", ((1.0, 0.0, 0.0),) * 3),
+    "shader": (5, "quick", ["rt"]),
 }
 POSSIBLE_FREQUENCIES = {100: 1, 50: 2, 100 / 3: 3, 33.333333: 3, 25: 4, 20: 5, 12.5: 8, 1: 100}
 ALLOWED_PHYSICS: dict[str, tuple[Any, ...]] = {

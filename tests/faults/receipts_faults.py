@@ -216,6 +216,9 @@ _FIELDS: dict[Place, Any] = {
     ("making", "camera_size"): [64],
     ("making", "bystanders"): 1,
     ("making", "simulator"): None,
+    ("making", "sensor_configs"): [64],
+    ("making", "enable_shadow"): "yes",
+    ("making", "touch"): "fingers",
     ("making", "num_envs"): 1.5,
     ("environment",): [],
     ("environment", "versions"): "3.11",
@@ -290,6 +293,9 @@ _NONSENSE: dict[str, Callable[[Any], object]] = {
     "an unknown axis of randomization": _set(("making", "randomization"), {"mas": 1}),
     "a mass below nothing": _set(("making", "randomization"), {"mass": {"Tee": -1.0}}),
     "a camera without a name": _set(("making", "cameras"), [{"eye": [0, 0, 1]}]),
+    "a camera that is not there": _set(("making", "sensor_configs"), {"wrist": {"fov": 1.0}}),
+    "a link that is not there": _set(("making", "touch"), {"arm": ["palm"]}),
+    "a hand that is not there": _set(("making", "touch"), {"hand": True}),
     "pictures of a terapixel": _both(
         _set(("making", "camera_size"), [10**6, 10**6]), _set(("making", "obs_mode"), "rgb")
     ),

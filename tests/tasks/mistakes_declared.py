@@ -131,9 +131,9 @@ MISTAKES = (
         "one camera in the place of a tuple",
         dict(cameras=Camera((0, 0, 1.0), (0, 0, 0))),
         (
-            "Tray.cameras is Camera(eye=(0.0, 0.0, 1.0), target=(0....5707963267948966, "
-            "near=0.01, far=100.0); a tuple of tasks.Camera is needed, such as (Camera((0.3, 0, "
-            "0.6), (0, 0, 0.1)),) with its comma"
+            "Tray.cameras is Camera(eye=(0.0, 0.0, 1.0), target=(0....ount=None, "
+            "intrinsic=None, shader=None); a tuple of tasks.Camera is needed, such as "
+            "(Camera((0.3, 0, 0.6), (0, 0, 0.1)),) with its comma"
         ),
     ),
     Mistake(

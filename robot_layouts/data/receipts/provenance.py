@@ -43,6 +43,7 @@ from robots import RobotLayoutsError, UnreadableFileError
 from robots.control_modes import plain_mode
 from robots.fingerprint import asset_checksums
 from tasks import MultiRobotTask, Scenario
+from tasks.engine.cameras import plain
 from tasks.episode import Score
 from tasks.randomization.declaration import Randomization
 
@@ -65,6 +66,9 @@ class _ProvenanceMaking(TypedDict):
     bystanders: Name | None
     simulator: Name
     num_envs: NotRequired[Annotated[int, whole(1, _MOST)]]
+    sensor_configs: NotRequired[Object]
+    enable_shadow: NotRequired[bool]
+    touch: NotRequired[bool | Object]
 
 
 def describe_making(
@@ -98,6 +102,11 @@ def describe_making(
         "bystanders": scenario.bystanders,
         "simulator": scenario.simulator,
         **({} if num_envs is None else {"num_envs": num_envs}),
+        **_filled(
+            sensor_configs=plain(scenario.sensor_configs),
+            enable_shadow=scenario.enable_shadow,
+            touch=plain(scenario.touch),
+        ),
     }
     return json.loads(json.dumps(described))
 
@@ -297,7 +306,7 @@ def _importable_name(policy: Any) -> str | None:
     return None if found is None else f"{module}:{found}"
 
 
-def _filled(**parts: Mapping[str, Any]) -> dict[str, Any]:
+def _filled(**parts: Any) -> dict[str, Any]:
     """Return those parts that hold something."""
     return {name: part for name, part in parts.items() if part}
 

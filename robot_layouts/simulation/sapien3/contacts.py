@@ -16,6 +16,7 @@ from robot_layouts.simulation.sapien3.robot import SimulatedRobot
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 
 _Table = dict[tuple[int, int], tuple[int, int]]
+_Alone = dict[int, int]
 _NOTHING = (0.0, 0.0, 0.0)
 
 
@@ -29,6 +30,7 @@ class PairForces:
         """Look the pairs up in every world."""
         self._contacts = [world.system.get_contacts for world in worlds]
         self._tables = [_table(world, pairs) for world in worlds]
+        self._alone = [_alone(world, pairs) for world in worlds]
         self._shape = len(pairs), len(worlds), 3
         self._timestep = np.array(worlds[0].physics.timestep, np.float32)
 
@@ -36,7 +38,8 @@ class PairForces:
         """Return the forces, (P, N, 3) (N, world frame), or None if no pair touches."""
         forces: Floats | None = None
         for env, contacts in enumerate(self._contacts):
-            for pair, impulse in _impulses(contacts(), self._tables[env]).items():
+            impulses = _impulses(contacts(), self._tables[env], self._alone[env])
+            for pair, impulse in impulses.items():
                 if forces is None:
                     forces = np.zeros(self._shape, np.float32)
                 forces[pair, env] = impulse
@@ -47,28 +50,43 @@ def _table(world: BuiltWorld, pairs: Sequence[Pair]) -> _Table:
     """Return each pair's number and the sign of its impulses, by the identity of the bodies."""
     table: _Table = {}
     for number, pair in enumerate(pairs):
-        link = id(world.robots[pair.robot].links[pair.link])
-        body = id(world.bodies[pair.body].component)
-        table[link, body] = number, 1  # an impulse acts on the first
-        table[body, link] = number, -1
+        if pair.body is not None:
+            link = id(world.robots[pair.robot].links[pair.link])
+            body = id(world.bodies[pair.body].component)
+            table[link, body] = number, 1  # an impulse acts on the first
+            table[body, link] = number, -1
     return table
 
 
-def _impulses(contacts: Sequence[Any], table: _Table) -> dict[int, list[float]]:
+def _alone(world: BuiltWorld, pairs: Sequence[Pair]) -> _Alone:
+    """Return the number of each link whose every contact counts, by the link's identity."""
+    return {
+        id(world.robots[pair.robot].links[pair.link]): number
+        for number, pair in enumerate(pairs)
+        if pair.body is None
+    }
+
+
+def _impulses(contacts: Sequence[Any], table: _Table, alone: _Alone) -> dict[int, list[float]]:
     """Return the impulse on each link that is pressed, (3,) (N·s), by the pair's number."""
     impulses: dict[int, list[float]] = {}
     for contact in contacts:
         first, second = contact.bodies
         found = table.get((id(first), id(second)))
-        if found is None:
+        counted = () if found is None else (found,)
+        if alone:
+            signs = ((id(first), 1), (id(second), -1))
+            counted += tuple((alone[link], sign) for link, sign in signs if link in alone)
+        if not counted:
             continue
         points = [point.impulse for point in contact.points]
         pressing = [impulse for impulse in points if any(impulse.tolist())]
         if pressing:  # most are of bodies that are only near
             # As native does: the points of a contact in float32, contacts in float64.
-            (pair, sign), total = found, reduce(add, pressing).tolist()
-            so_far = impulses.get(pair, _NOTHING)
-            impulses[pair] = [a + sign * b for a, b in zip(so_far, total, strict=True)]
+            total = reduce(add, pressing).tolist()
+            for pair, sign in counted:
+                so_far = impulses.get(pair, _NOTHING)
+                impulses[pair] = [a + sign * b for a, b in zip(so_far, total, strict=True)]
     return impulses
 
 

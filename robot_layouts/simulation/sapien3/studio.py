@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from math import tan
+from typing import Any, NamedTuple
 
 import numpy as np
 import sapien
@@ -30,12 +31,17 @@ from robot_layouts.simulation.sapien3.backdrop import (
 from robot_layouts.simulation.sapien3.device import expect_render_device
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.scene.cameras import (
-    RAW,
+    RAW_IMAGES,
+    RAY_TRACING,
     AnyCamera,
     RobotCamera,
     View,
     camera_name,
-    shaders_for,
+    field_of_view,
+    lens_of,
+    ridden,
+    shaders_of,
+    told_by,
 )
 from robot_layouts.simulation.scene.looks import AS_DECLARED, LIGHTS, Looks
 from robots import SimulationError
@@ -45,29 +51,33 @@ from robots.descriptor import Vector3
 # from the lamp.
 SKY = (0.3, 0.3, 0.3)
 LAMPS = (((1.0, 1.0, -1.0), (1.0, 1.0, 1.0)), ((0.0, 0.0, -1.0), (1.0, 1.0, 1.0)))
+SHADOW_SIZE = 5.0  # m, half the side of the square in which the first lamp casts shadows
 
 # mani_skill 3.0.1, render/shaders.py: how each pack stores images, and what is taken from them
 _FORMATS = {
     "minimal": {COLOR: "r8g8b8a8unorm", PLACE: "r16g16b16a16sint"},
     "default": {COLOR: "r32g32b32a32sfloat"},
 }
-_PIXELS: dict[str, dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[Any]]]]] = {
-    "minimal": {
-        "rgb": (COLOR, lambda x: x[..., :3]),
-        "position": (PLACE, lambda x: x[..., :3]),
-        "depth": (PLACE, lambda x: -x[..., 2:3]),
-        "segmentation": (PLACE, lambda x: x[..., 3:]),
-        **{image: (image, lambda x: x) for image in RAW},
-    },
-    "default": {
-        "rgb": (COLOR, lambda x: _scaled(x, 255, torch.uint8)),
-        "depth": ("Position", lambda x: -_scaled(x, 1000, torch.int16)[..., 2:]),
-        "position": ("Position", lambda x: _scaled(x, 1000, torch.int16)),
-        "segmentation": ("Segmentation", lambda x: x[..., 1:2].astype(np.int64)),
-        "normal": ("Normal", lambda x: x[..., :3]),
-        "albedo": ("Albedo", lambda x: _scaled(x, 255, torch.uint8)),
-    },
+_Pixels = dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[Any]]]]
+_QUICK: _Pixels = {
+    "rgb": (COLOR, lambda x: x[..., :3]),
+    "position": (PLACE, lambda x: x[..., :3]),
+    "depth": (PLACE, lambda x: -x[..., 2:3]),
+    "segmentation": (PLACE, lambda x: x[..., 3:]),
+    **{image: (image, lambda x: x) for image in RAW_IMAGES["minimal"]},
 }
+_SLOW: _Pixels = {
+    "rgb": (COLOR, lambda x: _scaled(x, 255, torch.uint8)),
+    "depth": ("Position", lambda x: -_scaled(x, 1000, torch.int16)[..., 2:]),
+    "position": ("Position", lambda x: _scaled(x, 1000, torch.int16)),
+    "segmentation": ("Segmentation", lambda x: x[..., 1:2].astype(np.int64)),
+    "normal": ("Normal", lambda x: x[..., :3]),
+    "albedo": ("Albedo", lambda x: _scaled(x, 255, torch.uint8)),
+    COLOR: (COLOR, lambda x: x),
+    "Position": ("Position", lambda x: x),
+    "Segmentation": ("Segmentation", lambda x: x.astype(np.int64)),
+}
+_PIXELS = {"minimal": _QUICK, "default": _SLOW, **dict.fromkeys(RAY_TRACING, _SLOW)}
 
 Drawn = Callable[[], list[View]]
 """Waits until pictures are drawn, and returns what each camera sees."""
@@ -99,7 +109,10 @@ class Studio:
         self._scene = sapien.Scene([world.scene.render_system])
         self._scene.set_ambient_light(list(SKY))
         self._lamps: list[Any] = [
-            self._scene.add_directional_light(list(d), list(c)) for d, c in LAMPS
+            self._scene.add_directional_light(
+                list(d), list(c), shadow=world.shadows and casts, shadow_scale=SHADOW_SIZE
+            )
+            for (d, c), casts in zip(LAMPS, (True, False), strict=True)
         ]
         self._cameras: dict[tuple[Any, ...], Any] = {}
         self._markers = _markers(world)
@@ -119,48 +132,43 @@ class Studio:
             self._dress(self._world.looks)
         for marker in self._markers:
             marker.visibility = float(markers)
-        shaders = shaders_for(textures)
-        placed = [self._placed(name, camera, shaders) for name, camera in cameras.items()]
+        placed = [self._placed(name, camera, textures) for name, camera in cameras.items()]
         self._scene.update_render()
-        if markers or shaders != LAYERED or not self._bodies.solid:
-            return self._whole(placed, textures)
-        riding = [isinstance(camera, RobotCamera) for camera in cameras.values()]
-        return self._layered(placed, riding, textures)
+        layered = all(shot.shaders == LAYERED for shot in placed)
+        if markers or not layered or not self._bodies.solid or self._world.shadows:
+            return self._whole(placed)
+        return self._layered(placed)
 
-    def _whole(self, cameras: Sequence[Any], textures: Sequence[str]) -> Drawn:
+    def _whole(self, placed: Sequence[_PlacedCamera]) -> Drawn:
         """Begin to take pictures of everything at once."""
         self._bodies.show_all()
-        for camera in cameras:
-            camera.take_picture()
-        names = _images(textures)
-        return lambda: [_view(camera, textures, _pictures(camera, names)) for camera in cameras]
+        for shot in placed:
+            shot.camera.take_picture()
+        return lambda: [_view(shot, shot.pictures()) for shot in placed]
 
-    def _layered(
-        self, cameras: Sequence[Any], riding: Sequence[bool], textures: Sequence[str]
-    ) -> Drawn:
+    def _layered(self, placed: Sequence[_PlacedCamera]) -> Drawn:
         """Begin to take pictures of what each camera may see.
 
         Those of cameras that stand still show only what moves; what does not comes behind it.
         """
-        standing = [camera for camera, rides in zip(cameras, riding, strict=True) if not rides]
+        standing = [shot.camera for shot in placed if not shot.rides]
         backdrops = self._backdrops_of(standing)
         self._bodies.show_moving([backdrop.planes for backdrop in backdrops.values()])
         for camera in standing:
             camera.take_picture()
-        for camera in cameras:
-            if camera not in backdrops:
-                self._bodies.show_seen(planes(camera))
-                camera.take_picture()
-        names = _images(textures)
+        for shot in placed:
+            if shot.rides:
+                self._bodies.show_seen(planes(shot.camera))
+                shot.camera.take_picture()
 
         def views() -> list[View]:
             found: list[View] = []
-            for camera in cameras:
-                backdrop = backdrops.get(camera)
-                images = backdrop.behind(camera, names) if backdrop else _pictures(camera, names)
+            for shot in placed:
+                backdrop = backdrops.get(shot.camera)
+                images = backdrop.behind(shot.camera, shot.images) if backdrop else shot.pictures()
                 if images is None:
-                    return self._whole(cameras, textures)()
-                found.append(_view(camera, textures, images))
+                    return self._whole(placed)()
+                found.append(_view(shot, images))
             return found
 
         return views
@@ -175,24 +183,28 @@ class Studio:
                 self._backdrops[camera] = Backdrop(camera, poses)
         return {camera: self._backdrops[camera] for camera in cameras}
 
-    def _placed(self, name: str, camera: AnyCamera, shaders: str) -> Any:
-        lens = camera.mount if isinstance(camera, RobotCamera) else camera
-        key = shaders, name, lens.width, lens.height, lens.fov, lens.near, lens.far
+    def _placed(self, name: str, camera: AnyCamera, textures: Sequence[str]) -> _PlacedCamera:
+        lens, intrinsic = lens_of(camera), camera.intrinsic
+        shaders = shaders_of(camera, textures)
+        key = shaders, name, lens.width, lens.height, lens.fov, lens.near, lens.far, intrinsic
         if key not in self._cameras:
             self._cameras[key] = self._add_camera(*key)
         placed = self._cameras[key]
-        if isinstance(camera, RobotCamera):
-            link = self._world.robots[camera.robot].link(camera.mount.link)
-            mount = camera.mount
-            placed.entity.set_pose(link.entity_pose)
-            pose = sapien.Pose(list(mount.position), list(mount.quaternion))
-        else:
-            pose = look_at(camera.eye, camera.target)
+        if on := ridden(camera):
+            robot, link = on
+            placed.entity.set_pose(self._world.robots[robot].link(link).entity_pose)
+        pose = _local_pose(camera)
         shift = self._looks.cameras.get(camera_name(camera))
         placed.local_pose = pose if shift is None else shifted(pose, shift)
         if shift is not None:
-            placed.set_fovy(widened(lens.fov, shift), compute_x=True)
-        return placed
+            seen = field_of_view(camera)
+            wide = widened(seen, shift)
+            if intrinsic is None:
+                placed.set_fovy(wide, compute_x=True)
+            else:
+                zoom = tan(seen / 2) / tan(wide / 2)
+                placed.set_focal_lengths(intrinsic[0][0] * zoom, intrinsic[1][1] * zoom)
+        return _PlacedCamera(placed, shaders, told_by(camera, textures), on is not None)
 
     def _dress(self, looks: Looks) -> None:
         """Let everything look as it is to from now on."""
@@ -212,12 +224,47 @@ class Studio:
             self._scene.set_ambient_light(light_color(SKY, glow))
         self._bodies, self._backdrops = DrawnBodies(self._world), {}
 
-    def _add_camera(self, shaders: str, *lens: Any) -> Any:
+    def _add_camera(self, shaders: str, *key: Any) -> Any:
         # Process-wide, bound when a camera is made; others in this process may have changed them.
-        sapien.render.set_camera_shader_dir(shaders)
-        for image, pixels in _FORMATS[shaders].items():
+        sapien.render.set_camera_shader_dir("rt" if shaders in RAY_TRACING else shaders)
+        for image, pixels in _FORMATS.get(shaders, {}).items():
             sapien.render.set_picture_format(image, pixels)
-        return self._scene.add_camera(*lens)
+        if rays := RAY_TRACING.get(shaders):
+            sapien.render.set_ray_tracing_samples_per_pixel(rays[0])
+            sapien.render.set_ray_tracing_path_depth(rays[1])
+            sapien.render.set_ray_tracing_denoiser("optix")
+        *lens, intrinsic = key
+        camera = self._scene.add_camera(*lens)
+        if intrinsic is not None:
+            (fx, _, cx), (_, fy, cy), _ = intrinsic
+            camera.set_focal_lengths(fx, fy)
+            camera.set_principal_point(cx, cy)
+        return camera
+
+
+class _PlacedCamera(NamedTuple):
+    """A camera of SAPIEN's in its place, and what is taken with it.
+
+    Attributes:
+        camera: The camera.
+        shaders: Which of `SHADERS` draw its pictures.
+        textures: What it tells.
+        rides: Whether it rides on a link.
+    """
+
+    camera: Any
+    shaders: str
+    textures: tuple[str, ...]
+    rides: bool
+
+    @property
+    def images(self) -> set[str]:
+        """Names of the images that its textures are taken from."""
+        return {_PIXELS[self.shaders][texture][0] for texture in self.textures}
+
+    def pictures(self) -> dict[str, NDArray[Any]]:
+        """Return these images; waits until they are drawn."""
+        return {name: self.camera.get_picture(name) for name in self.images}
 
 
 def _markers(world: BuiltWorld) -> list[Any]:
@@ -228,25 +275,23 @@ def _markers(world: BuiltWorld) -> list[Any]:
     ]
 
 
-def _images(textures: Sequence[str]) -> set[str]:
-    """Return the names of the images that textures are taken from."""
-    pixels = _PIXELS[shaders_for(textures)]
-    return {pixels[texture][0] for texture in textures}
-
-
-def _pictures(camera: Any, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-    return {name: camera.get_picture(name) for name in names}
-
-
-def _view(camera: Any, textures: Sequence[str], images: Mapping[str, NDArray[Any]]) -> View:
-    pixels = _PIXELS[shaders_for(textures)]
-    taken = ((texture, *pixels[texture]) for texture in textures)
+def _view(shot: _PlacedCamera, images: Mapping[str, NDArray[Any]]) -> View:
+    taken = ((texture, *_PIXELS[shot.shaders][texture]) for texture in shot.textures)
     return View(
         {texture: values(images[image]) for texture, image, values in taken},
-        camera.get_extrinsic_matrix(),
-        camera.get_model_matrix(),
-        camera.get_intrinsic_matrix(),
+        shot.camera.get_extrinsic_matrix(),
+        shot.camera.get_model_matrix(),
+        shot.camera.get_intrinsic_matrix(),
     )
+
+
+def _local_pose(camera: AnyCamera) -> sapien.Pose:
+    """Return a camera's pose in the world or, if it rides, in the link's frame."""
+    if isinstance(camera, RobotCamera):
+        return sapien.Pose(list(camera.mount.position), list(camera.mount.quaternion))
+    if camera.target is not None:
+        return look_at(camera.eye, camera.target)
+    return sapien.Pose(list(camera.eye), list(camera.quaternion or ()))
 
 
 def _scaled(image: NDArray[Any], factor: int, dtype: torch.dtype) -> NDArray[Any]:

@@ -85,6 +85,7 @@ class BuiltWorld:
         studio: Its cameras and lights, once a picture was taken.
         built: What varied parts were built with; see `vary`.
         looks: What differs in its pictures.
+        shadows: Whether the first light casts shadows in them.
     """
 
     def __init__(
@@ -136,7 +137,7 @@ class BuiltWorld:
         self.articulations = [robot.articulation for robot in self.robots.values()]
         self.bodies: dict[str, BuiltBody] = {}
         self.built: dict[tuple[Part, str], Any] = {}
-        self.looks = AS_DECLARED
+        self.looks, self.shadows = AS_DECLARED, False
         self.studio: Any = None  # as long as this world lives, also in a fork
 
     def add(self, body: WorldBody) -> BuiltBody:
@@ -223,6 +224,7 @@ def build_world(world: World, blueprints: dict[RobotDescriptor, Blueprint]) -> B
         blueprints=blueprints,
         links_pass=world.links_pass,
     )
+    built.shadows = world.shadows
     for body in world.bodies.values():
         built.add(body)
     built.settle()
