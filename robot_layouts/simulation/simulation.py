@@ -228,6 +228,10 @@ class Simulation:
             self._change()
         return self.backend.look(env, cameras, textures, markers=markers)
 
+    def describe_graphics(self) -> dict[str, str]:
+        """Return on what pictures are drawn; see `Backend.describe_graphics`."""
+        return self.backend.describe_graphics()
+
     # -- inside ------------------------------------------------------------------------------
 
     def _drive(

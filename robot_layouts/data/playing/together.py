@@ -5,7 +5,7 @@ Who plays an episode is a policy as it was passed, or an expert's plan.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -144,14 +144,23 @@ def play_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> None:
             pass
 
 
-def states_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[States]:
+def states_together(
+    env: TaskEnv,
+    players: Sequence[EpisodePlayer],
+    on_moment: Callable[[Any], None] = lambda observation: None,
+) -> list[States]:
     """Play an episode for each player, as `steps_together` does, and return the states of each.
+
+    Args:
+        env: The task.
+        players: Who plays.
+        on_moment: Called with what `steps_together` yields.
 
     Returns:
         State dicts of `TaskEnv.get_state_dict`, each entry (T + 1, k) for T steps of its
         player.
     """
-    played = iter(_played_states(env, _acting(players)))
+    played = iter(_played_states(env, _acting(players), on_moment))
     return [next(played) if p.rehearsed is None else p.rehearsed.states for p in players]
 
 
@@ -172,14 +181,19 @@ def _acting(players: Sequence[EpisodePlayer]) -> list[EpisodePlayer]:
     return [player for player in players if player.rehearsed is None]
 
 
-def _played_states(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[States]:
+def _played_states(
+    env: TaskEnv,
+    players: Sequence[EpisodePlayer],
+    on_moment: Callable[[Any], None] = lambda observation: None,
+) -> list[States]:
     if not players:
         return []
     happening = steps_together(env, players)
-    next(happening)
+    on_moment(next(happening))
     tape = env.begin_tape()
     env.write_tape(tape)
-    for _ in happening:
+    for observation in happening:
+        on_moment(observation)
         env.write_tape(tape)
     states = tape.read()
     return [
@@ -191,7 +205,7 @@ def _played_states(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[State
     ]
 
 
-def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[None]:
+def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[Any]:
     """Play an episode for each player, from freshly built worlds, until all are over.
 
     Every player sees its own environment alone, and draws from generators that are its own, so
@@ -204,7 +218,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
             them.
 
     Yields:
-        Nothing: once after the reset, and once after every step.
+        What is observed of all environments: once after the reset, and once after every step.
 
     Raises:
         BatchError: If the actions of a batched policy are not one for each environment.
@@ -212,7 +226,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
     """
     ids = list(range(len(players)))
     observation, _ = env.reset([player.seed for player in players], REBUILT, ids)
-    yield
+    yield observation
     reader = ActionReader(env.layout, 1)
     actions = np.zeros((env.num_envs, env.layout.action_dim), np.float32)
     env.trust(actions)  # what is written there was checked
@@ -233,7 +247,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
             moment = StepResult(None, reward, bool(success), ended, late, seconds)
             players[i].choices.append(choices[i])
             players[i].moments.append(moment)
-        yield
+        yield observation
 
 
 def is_batched(policy: object) -> bool:

@@ -68,7 +68,11 @@ class _ProvenanceMaking(TypedDict):
 
 
 def describe_making(
-    cls: type[MultiRobotTask], scenario: Scenario, num_envs: int | None = None
+    cls: type[MultiRobotTask],
+    scenario: Scenario,
+    num_envs: int | None = None,
+    *,
+    pictures: bool = False,
 ) -> dict[str, Any]:
     """Return what a task is made with.
 
@@ -79,13 +83,14 @@ def describe_making(
         cls: Class of the task.
         scenario: What it is made with.
         num_envs: How many environments play at once, where that makes a difference.
+        pictures: Whether ``files`` are also those that are drawn.
 
     Raises:
         AssetError: If robot files cannot be found.
     """
     mode, varied = scenario.control_mode, scenario.randomization
     described = {
-        "layout": _describe_places(scenario.layout),
+        "layout": _describe_places(scenario.layout, pictures=pictures),
         "obs_mode": scenario.obs_mode,
         "reward_mode": scenario.reward_mode or cls.reward_modes[0],
         "control_mode": None if mode is None else plain_mode(mode),
@@ -102,13 +107,13 @@ def describe_making(
     return json.loads(json.dumps(described))
 
 
-def _describe_places(layout: Layout) -> dict[str, Any]:
+def _describe_places(layout: Layout, *, pictures: bool) -> dict[str, Any]:
     return {
         place: {
             **{name: value for name, value in about.items() if name != "assets"},
             "control_mode": layout[place].control_mode,
             "descriptor": descriptor_digest(layout[place].robot),
-            "files": asset_checksums(layout[place].robot.urdf),
+            "files": asset_checksums(layout[place].robot.urdf, pictures=pictures),
         }
         for place, about in describe_layout(layout).items()
     }
@@ -173,13 +178,13 @@ def describe_job(job: EvaluationJob, name: str | None = None) -> dict[str, Any]:
         AssetError: If robot files cannot be found.
         ReceiptError: If a file of the policy cannot be read.
     """
-    cast = job.cast
+    cast, pictures = job.cast, job.pictures is not None
     at_once = job.scenario.num_envs if is_batched(cast.policy) else None
     expert = cast.expert
     return {
         "task": describe_task(job.task),
         "policy": describe_policy(cast.policy, name) if expert is None else describe_expert(expert),
-        "making": describe_making(job.task, job.scenario, at_once),
+        "making": describe_making(job.task, job.scenario, at_once, pictures=pictures),
     }
 
 
@@ -209,12 +214,21 @@ def receipt_of(
     return Receipt(
         **described,
         environment={**first, **{name: value for name, value in more.items() if value}},
-        episodes=tuple(
-            EpisodeReceipt(
-                seed, s.success, s.steps, s.total, s.trace.states, s.trace.trace, s.reason
-            )
-            for seed, s in traced.items()
-        ),
+        episodes=tuple(_episode(seed, score) for seed, score in traced.items()),
+        pictures={} if job.pictures is None else {"interval": job.pictures.interval},
+    )
+
+
+def _episode(seed: int, score: TracedScore) -> EpisodeReceipt:
+    return EpisodeReceipt(
+        seed,
+        score.success,
+        score.steps,
+        score.total,
+        score.trace.states,
+        score.trace.trace,
+        score.reason,
+        {name: asdict(trace) for name, trace in score.pictures.items()},
     )
 
 
