@@ -95,7 +95,8 @@ class PictureWatch:
         """
         self._players, self._interval = players, watched.interval
         self._episodes = [
-            _EpisodePictures(watched.kept, watched.expected.get(player.seed, {})) for player in players
+            _EpisodePictures(watched.kept, watched.expected.get(player.seed, {}))
+            for player in players
         ]
 
     def __call__(self, observation: Any) -> None:
