@@ -64,6 +64,7 @@ class _ProvenanceMaking(TypedDict):
     camera_size: Annotated[list[Annotated[int, whole(1, _MOST)]], length(2)] | None
     bystanders: Name | None
     simulator: Name
+    visuals: NotRequired[Name]
     num_envs: NotRequired[Annotated[int, whole(1, _MOST)]]
 
 
@@ -102,6 +103,7 @@ def describe_making(
         "camera_size": scenario.camera_size,
         "bystanders": scenario.bystanders,
         "simulator": scenario.simulator,
+        **({} if scenario.visuals == "full" else {"visuals": scenario.visuals}),
         **({} if num_envs is None else {"num_envs": num_envs}),
     }
     return json.loads(json.dumps(described))
