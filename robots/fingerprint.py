@@ -31,20 +31,25 @@ def asset_fingerprint(source: UrdfSource) -> str:
     return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
-def asset_checksums(source: UrdfSource) -> dict[str, str]:
+def asset_checksums(source: UrdfSource, *, pictures: bool = False) -> dict[str, str]:
     """Return the SHA-256, in hex, of each of these files, by its path relative to the URDF.
+
+    Args:
+        source: Where the URDF comes from.
+        pictures: Whether to add the visual meshes that it names.
 
     Raises:
         AssetError: If a file cannot be found or read.
     """
-    return dict(_checksums(source))
+    return dict(_checksums(source, pictures=pictures))
 
 
-def _checksums(source: UrdfSource) -> list[tuple[str, str]]:
-    urdf = source.locate()
+def _checksums(source: UrdfSource, *, pictures: bool = False) -> list[tuple[str, str]]:
+    urdf = source.locate(pictures=pictures)
+    beside = _beside(urdf, pictures=pictures)
     try:
         contents = [(urdf, read_written(urdf))]
-        contents += ((path, read_regular(path, MAX_MESH_BYTES)) for path in _beside(urdf))
+        contents += ((path, read_regular(path, MAX_MESH_BYTES)) for path in beside)
     except UnreadableFileError as error:
         raise AssetError(str(error)) from error
     return [
@@ -53,7 +58,8 @@ def _checksums(source: UrdfSource) -> list[tuple[str, str]]:
     ]
 
 
-def _beside(urdf: Path) -> list[Path]:
+def _beside(urdf: Path, *, pictures: bool) -> list[Path]:
     references = read_references(read_urdf(urdf), urdf.as_posix(), exists=os.path.isfile)
     srdf = srdf_beside(urdf)
-    return [*([srdf] if srdf else []), *map(Path, references.collision)]
+    visual = references.visual if pictures else ()
+    return [*([srdf] if srdf else []), *map(Path, (*references.collision, *visual))]

@@ -114,6 +114,7 @@ class TestDependencies:
             "preview",
             "view",
             "browser",
+            "light",
             "video",
             "export",
             "mjcf",

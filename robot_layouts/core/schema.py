@@ -73,9 +73,9 @@ def length(count: int) -> Meta:
     return Meta(min_length=count, max_length=count, description=f"a list of {count} values")
 
 
-def exactly(text: str) -> Meta:
-    """Return the only text that there may be, such as the format of a file."""
-    return Meta(pattern=rf"^{text}\Z", description=repr(text))
+def exactly(*texts: str) -> Meta:
+    """Return the only texts that there may be, such as the format of a file."""
+    return Meta(pattern=rf"^({'|'.join(texts)})\Z", description=" or ".join(map(repr, texts)))
 
 
 def check(value: Any, hint: Any, name: str, error: Callable[[str], Exception] = FieldError) -> Any:

@@ -13,14 +13,17 @@ from typing import TYPE_CHECKING, Any
 from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.writing import writing_errors
 from robot_layouts.data.actors import EXPERT
-from robot_layouts.data.playing.evaluation_job import EvaluationJob, scores_of
+from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore, scores_of
 from robot_layouts.data.playing.executor import Executor, choose_executor
+from robot_layouts.data.playing.picture_digests import WatchedPictures
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event
 from robot_layouts.data.playing.seeds import checked_seeds, seed_lines
 from robot_layouts.data.playing.together import Cast, cast_of, grouped
+from robot_layouts.data.receipts.pictures import keep, pictures_folder
 from robot_layouts.data.receipts.provenance import describe_job, receipt_of
 from robot_layouts.data.receipts.receipt import Receipt
 from robots import TaskError
+from tasks.engine.observation import read_mode
 from tasks.episode import Policy, Score
 from tasks.registry import scenario_of
 
@@ -94,6 +97,8 @@ def evaluate(
     executor: Executor | None = None,
     episode_timeout: float | None = EPISODE_SECONDS,
     receipt: str | PathLike[str] | None = None,
+    picture_interval: int = 1,
+    keep_pictures: bool = False,
     on_event: Callable[[Event], None] = lambda event: None,
     **making: Unpack[MakingFields],
 ) -> Evaluation:
@@ -124,6 +129,10 @@ def evaluate(
             until that is ended and they are played again, three times in all; None if they may
             take for ever.
         receipt: File to write a receipt to, json that `verify` plays again.
+        picture_interval: If pictures are observed, the receipt has a digest of those after the
+            reset and after each so many-th control step.
+        keep_pictures: Whether to keep these pictures, in the folder NAME.pictures beside the
+            receipt NAME.json: `verify` shows them beside those that differ.
         on_event: Called with each event of the executor, to show progress.
         making: Arguments of `tasks.make`, such as ``robots`` and ``obs_mode``, if ``task`` is an
             id.
@@ -132,7 +141,7 @@ def evaluate(
         UnknownNameError: If the task, a place, a robot or a field is unknown.
         TaskError: If the task cannot be made like that or has no expert, a number is out
             of range, there are no seeds, or one is given twice.
-        UnwritableFileError: If the receipt cannot be written.
+        UnwritableFileError: If the receipt or its pictures cannot be written.
         AssetError: If the receipt needs robot files that cannot be found.
         ReceiptError: If it needs files of the policy that cannot be read.
         WorkerError: If the policy raised something, cannot be sent to the workers, or they die of
@@ -143,16 +152,31 @@ def evaluate(
     if not seeds:
         raise TaskError("no seeds were given; an evaluation plays one or more")
     checked_whole("num_envs", num_envs, 1, None, TaskError)
+    checked_whole("picture_interval", picture_interval, 1, None, TaskError)
+    if receipt is None and (keep_pictures or picture_interval != 1):
+        raise TaskError("pictures belong to a receipt; give the file of one, receipt=…")
     num_envs = min(num_envs, len(seeds))
     cls, scenario = scenario_of(task, num_envs, **making)
     cast, imported = cast_of(policy, cls)
     scenario.check(cls.reward_modes)
-    job = EvaluationJob(cls, scenario, cast, grouped(seeds, num_envs), receipt is not None)
+    together = grouped(seeds, num_envs)
     if receipt is None:
+        job = EvaluationJob(cls, scenario, cast, together)
         scores = scores_of(executor, job, on_event)
         return Evaluation(cls.task_id, _name(cast), {seed: scores[seed] for seed in seeds})
-    described = _described(job, imported, receipt)
-    found = scores_of(executor, job, on_event)
+    observed = read_mode(scenario.obs_mode).textures is not None
+    if keep_pictures and not observed:
+        raise TaskError(f"obs_mode {scenario.obs_mode!r} observes no pictures that could be kept")
+    pictures = WatchedPictures(picture_interval, keep_pictures) if observed else None
+    job = EvaluationJob(cls, scenario, cast, together, traced=True, pictures=pictures)
+    described, folder = _described(job, imported, receipt), pictures_folder(receipt)
+
+    def write_pictures(event: Event) -> None:
+        if event.seed is not None and isinstance(event.result, TracedScore) and event.result.images:
+            keep(event.result.images, event.seed, folder)
+        on_event(event)
+
+    found = scores_of(executor, job, write_pictures)
     written = receipt_of(described, job, {seed: found[seed] for seed in seeds})
     written.write(receipt)
     scores = {e.seed: Score(e.success, e.total, e.steps, e.reason) for e in written.episodes}

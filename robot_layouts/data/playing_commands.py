@@ -127,6 +127,8 @@ def evaluate(
     players: Players,
     seed: Seed = 0,
     receipt: Annotated[Path, Word("JSON")] | None = None,
+    picture_interval: Count = 1,
+    keep_pictures: bool = False,
     acting: Acting,
     cell: CellOptions,
 ) -> None:
@@ -141,6 +143,8 @@ def evaluate(
         players: Who plays.
         seed: Seeds S … S + N - 1.
         receipt: Write a receipt, which `verify` plays again.
+        picture_interval: The receipt has a digest of the pictures of each so many-th step.
+        keep_pictures: Keep these pictures, in a folder beside the receipt.
         acting: Who acts, and how.
         cell: The task's robots, and what varies.
 
@@ -164,6 +168,8 @@ def evaluate(
             seeds=range(seed, seed + episodes),
             executor=executor,
             receipt=receipt,
+            picture_interval=picture_interval,
+            keep_pictures=keep_pictures,
             on_event=show,
             **acting.playing(),
             **cell.making(),
@@ -230,13 +236,15 @@ def verify(
     task: Annotated[str, Word("MODULE:ID")] | None = None,
     robots: Sequence[PlacedRobot] = (),
     num_envs: Count = 1,
+    pictures: Annotated[Path, Word("DIR")] | None = None,
     players: Players,
 ) -> int:
     """Play the episodes of a receipt again, and compare every bit.
 
-    Tells the first seed and step whose states differ, and which robot files, sources, versions and
-    parts of the processor are not those of the receipt. Exit code: 0 if every bit and file is the
-    same, whatever the versions; 1 if not; 2 for bad usage, 130 if interrupted.
+    Tells the first seed and step whose states differ, or pictures if policies observed some, and
+    which robot files, sources, versions, drivers and parts of the processor are not those of the
+    receipt. Exit code: 0 if every bit and file is the same, whatever the versions; 1 if not; 2 for
+    bad usage, 130 if interrupted.
 
     Args:
         receipt: What `evaluate --receipt` wrote.
@@ -244,6 +252,8 @@ def verify(
         task: The task, if no installed package lists it.
         robots: Which robots these were, where the receipt cannot say it.
         num_envs: Episodes that play at once.
+        pictures: Where to write pictures that differ (the folder NAME.differences beside the
+            receipt).
         players: Who plays.
 
     Raises:
@@ -251,6 +261,7 @@ def verify(
     """
     from robot_layouts.core.progress import Progress
     from robot_layouts.data.receipts import verification
+    from robot_layouts.data.receipts.pictures import pictures_folder
     from robot_layouts.data.receipts.receipt import Receipt
 
     read = Receipt.read(receipt)
@@ -275,4 +286,7 @@ def verify(
     print(printable(repr(found)))
     verdict = "equal: this is" if found.equal else "not equal: this is not"
     print(f"{verdict} what the receipt says")
+    folder = pictures or receipt.with_suffix(".differences")
+    for path in found.write_pictures(folder, pictures_folder(receipt)):
+        print(path)
     return 0 if found.equal else 1

@@ -288,6 +288,10 @@ class Backend(Protocol):
         """
         ...
 
+    def describe_graphics(self) -> dict[str, str]:
+        """Return on what pictures are drawn, as plain data: device, driver, and its settings."""
+        ...
+
     def segments(self) -> dict[int, Part]:
         """Return what the numbers of a segmentation stand for, the same in every world."""
         ...

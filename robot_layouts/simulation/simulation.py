@@ -18,7 +18,7 @@ from robot_layouts.simulation.readout import Moment, ReadoutIndex
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.state import State
-from robot_layouts.simulation.world import Placements, World
+from robot_layouts.simulation.world import Placements, Visuals, World
 from robots import RobotDescriptor, SimulationError
 from robots.descriptor import IDENTITY, Quaternion
 
@@ -47,7 +47,7 @@ class Simulation:
         physics: PhysicsSettings | None = None,
         *,
         control_frequency: float = 20.0,
-        visuals: bool = False,
+        visuals: Visuals = False,
         links_pass: bool = False,
         simulator: str = "sapien3",
         shadows: bool = False,
@@ -73,7 +73,8 @@ class Simulation:
         self.substeps = substeps(physics or SAPIEN_DEFAULTS, control_frequency)
         self.layout, self.num_envs = layout, num_envs
         self._everywhere: Sequence[int] = range(num_envs)
-        self._physics, self._visuals = physics, visuals
+        self._physics = physics
+        self._visuals: Visuals = visuals
         self.links_pass = links_pass
         self.backend: Backend = open_backend(simulator)
         self._shadows = shadows
@@ -230,6 +231,10 @@ class Simulation:
         if self._placements:
             self._change()
         return self.backend.look(env, cameras, textures, markers=markers)
+
+    def describe_graphics(self) -> dict[str, str]:
+        """Return on what pictures are drawn; see `Backend.describe_graphics`."""
+        return self.backend.describe_graphics()
 
     # -- inside ------------------------------------------------------------------------------
 

@@ -20,6 +20,9 @@ from robots.descriptor import IDENTITY, Quaternion, Vector3
 BodyKind = Literal["dynamic", "kinematic", "static"]
 _KINDS = get_args(BodyKind)
 
+Visuals = bool | Literal["light"]
+"""Whether what pictures need is built; if \"light\", robots with meshes of fewer triangles."""
+
 
 @dataclass(frozen=True)
 class WorldBody:
@@ -81,7 +84,7 @@ class World:
     Attributes:
         layout: Which robots stand where.
         physics: Settings it is built with.
-        visuals: Whether what pictures need is built.
+        visuals: Whether what pictures need is built, and which meshes.
         bodies: Body by name.
         design: Geometry drawn for the coming episodes, if the task draws any.
         scales: Factor on the size of bodies, by name; 1 for those that are left out.
@@ -95,7 +98,7 @@ class World:
         layout: Layout,
         physics: PhysicsSettings | None = None,
         *,
-        visuals: bool = False,
+        visuals: Visuals = False,
         number: int = 0,
         placements: Placements | None = None,
         links_pass: bool = False,
@@ -114,7 +117,7 @@ class World:
         """
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
-        self.visuals = visuals
+        self.visuals: Visuals = visuals
         self.bodies: dict[str, WorldBody] = {}
         self.design: Any = None
         self.scales: Mapping[str, float] = {}

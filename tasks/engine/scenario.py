@@ -15,6 +15,7 @@ from robot_layouts.core.bounds import checked_choice, checked_flag, checked_whol
 from robot_layouts.simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from robot_layouts.simulation.backend import SIMULATORS
 from robot_layouts.simulation.physics import substeps
+from robot_layouts.simulation.world import Visuals
 from robots import TaskError, UnknownNameError
 from tasks.engine.cameras import checked_size
 from tasks.engine.display import scenario_html, scenario_text
@@ -25,6 +26,7 @@ from tasks.randomization.declaration import Randomization
 
 SENSOR_RENDER_MODES = ("sensors", "all")  # that show what cameras see
 RENDER_MODES = ("rgb_array", *SENSOR_RENDER_MODES)
+VISUALS = ("full", "light")
 LEAST_BYTES = 400_000  # of an environment: that of PickCube-v1, one of the smallest, takes 435 kB
 
 
@@ -60,6 +62,8 @@ class Scenario:
             of the robots come after.
         camera_size: Width and height (pixels) of what all these cameras see; None: each camera's
             own.
+        visuals: ``"full"`` draws robots as their files have them, ``"light"`` with meshes of fewer
+            triangles that are less than 1 mm from these, which is several times faster.
         simulator: ``"sapien3"``.
         bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
             take no action number, or ``"act"``, with action numbers of their own. None refuses
@@ -94,6 +98,7 @@ class Scenario:
     headless: bool = True
     cameras: Sequence[Camera] = field(default_factory=list[Camera])
     camera_size: tuple[int, int] | None = None
+    visuals: str = "full"
     simulator: str = "sapien3"
     bystanders: str | None = None
     randomization: Randomization | None = None
@@ -119,9 +124,11 @@ class Scenario:
         return scenario_html(self)
 
     @property
-    def draws(self) -> bool:
-        """Whether anything is drawn: for people, or for cameras that observe."""
-        return self.render_mode is not None or read_mode(self.obs_mode).draws
+    def draws(self) -> Visuals:
+        """Whether anything is drawn, for people or for cameras that observe, and what meshes."""
+        if self.render_mode is None and not read_mode(self.obs_mode).draws:
+            return False
+        return "light" if self.visuals == "light" else True
 
     def check(self, reward_modes: Sequence[str]) -> None:
         """Refuse values that no task can be made with.
@@ -147,6 +154,7 @@ class Scenario:
             )
         for name, choices in (
             ("simulator", tuple(SIMULATORS)),
+            ("visuals", VISUALS),
             ("render_mode", (None, *RENDER_MODES)),
             ("bystanders", (None, HOLD, ACT)),
             ("reward_mode", (None, *reward_modes)),
@@ -180,6 +188,7 @@ class ScenarioFields(TypedDict, total=False):
     headless: bool
     cameras: Sequence[Camera]
     camera_size: tuple[int, int] | None
+    visuals: str
     simulator: str
     check_layout: bool
     bystanders: str | None

@@ -145,7 +145,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             for own in partition(num_envs, workers, self.batch_size)
         ]
         for placement in layout.values():  # fetched here, not by all workers at once
-            placement.robot.urdf.locate(pictures=scenario.draws)
+            placement.robot.urdf.locate(pictures=bool(scenario.draws))
         self._process = os.getpid()
         self._backend = Workers(parts, timeout, self._seeds) if workers else InProcess(parts[0])
         self._close = weakref.finalize(self, self._backend.close)

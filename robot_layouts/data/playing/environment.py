@@ -24,6 +24,7 @@ PACKAGES = (
     "sapien",
     "numpy",
     "torch",
+    "fast-simplification",
     "gymnasium",
     "mujoco",
     "ompl",

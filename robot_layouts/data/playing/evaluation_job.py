@@ -5,7 +5,7 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from typing import Any, NoReturn
 
@@ -15,8 +15,16 @@ from numpy.typing import NDArray
 
 from robot_layouts.data.playing.environment import environment
 from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.picture_digests import (
+    BYTES,
+    Images,
+    PictureTrace,
+    PictureWatch,
+    WatchedPictures,
+)
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.together import (
+    EpisodePlayer,
     EpisodesJob,
     EpisodesPlay,
     one_by_one,
@@ -24,8 +32,6 @@ from robot_layouts.data.playing.together import (
     states_together,
 )
 from tasks.episode import Score, States
-
-BYTES = 2  # of the digest that are kept of each moment
 
 
 @dataclass(frozen=True)
@@ -75,10 +81,16 @@ class TracedScore(Score):
     Attributes:
         trace: The digest.
         environment: On what it was played; see `robot_layouts.data.playing.environment`.
+        pictures: The digests of its pictures, by their names, if they were watched.
+        images: Those of its pictures that were to be returned.
     """
 
     trace: StateTrace = field(kw_only=True)
     environment: Mapping[str, Any] = field(kw_only=True, compare=False)
+    pictures: Mapping[str, PictureTrace] = field(
+        kw_only=True, default_factory=dict[str, PictureTrace]
+    )
+    images: Images = field(kw_only=True, default_factory=Images, compare=False)
 
 
 @dataclass(frozen=True)
@@ -88,10 +100,12 @@ class EvaluationJob(EpisodesJob):
     Attributes:
         traced: Whether each score is to be a `TracedScore`.
         most_steps: Seed → steps after which its episode ends, if it has not ended before.
+        pictures: Which pictures get digests, if it is traced; None: none do.
     """
 
     traced: bool = False
     most_steps: Mapping[int, int] = field(default_factory=dict[int, int])
+    pictures: WatchedPictures | None = None
 
     def __call__(self) -> Callable[[int], dict[int, Score]]:
         """Make the task in a worker, and return what plays the episodes of a seed and others."""
@@ -108,12 +122,33 @@ class _EvaluationPlay(EpisodesPlay[EvaluationJob]):
             if not self._job.traced:
                 play_together(self._env, players)
                 return {player.seed: player.score for player in players}
+            if self._job.pictures is not None:
+                return self._watched(self._job.pictures, players)
             played = states_together(self._env, players)
         return {
             player.seed: TracedScore(
                 **vars(player.score), trace=trace_of(states), environment=environment()
             )
             for player, states in zip(players, played, strict=True)
+        }
+
+    def _watched(
+        self, pictures: WatchedPictures, players: Sequence[EpisodePlayer]
+    ) -> dict[int, Score]:
+        for player in players:
+            player.rehearsed = None  # without a look at its pictures
+        watch = PictureWatch(pictures, players)
+        played = states_together(self._env, players, watch)
+        about = {**environment(), "graphics": self._env.simulation.describe_graphics()}
+        return {
+            player.seed: TracedScore(
+                **vars(player.score),
+                trace=trace_of(states),
+                environment=about,
+                pictures=watch.traces(i),
+                images=watch.images(i),
+            )
+            for i, (player, states) in enumerate(zip(players, played, strict=True))
         }
 
 
@@ -125,7 +160,8 @@ def scores_of(
     Args:
         executor: Who plays.
         job: What is played.
-        on_event: Called with each event of the executor, one for each episode.
+        on_event: Called with each event of the executor, one for each episode. Images are only
+            in these.
 
     Raises:
         WorkerError: If an episode cannot be played.
@@ -136,11 +172,15 @@ def scores_of(
             for single in one_by_one(event):
                 on_event(single)
                 if single.seed is not None and isinstance(single.result, Score):
-                    scores[single.seed] = single.result
+                    scores[single.seed] = _without_images(single.result)
             if event.error is not None:
                 seeds = [event.seed] if event.seed is None else job.together[event.seed]
                 _raise(event.error, seeds)
     return scores
+
+
+def _without_images(score: Score) -> Score:
+    return replace(score, images={}) if isinstance(score, TracedScore) else score
 
 
 def _raise(error: Exception, seeds: Sequence[int | None]) -> NoReturn:

@@ -5,7 +5,7 @@ Who plays an episode is a policy as it was passed, or an expert's plan.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -149,14 +149,23 @@ def play_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> None:
             pass
 
 
-def states_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> list[States]:
+def states_together(
+    env: TaskEnv,
+    players: Sequence[EpisodePlayer],
+    on_moment: Callable[[Any], None] = lambda observation: None,
+) -> list[States]:
     """Play an episode for each player, as `steps_together` does, and return the states of each.
+
+    Args:
+        env: The task.
+        players: Who plays.
+        on_moment: Called with what `steps_together` yields.
 
     Returns:
         State dicts of `TaskEnv.get_state_dict`, each entry (T + 1, k) for T steps of its
         player.
     """
-    played = iter(_played(env, _acting(players)))
+    played = iter(_played(env, _acting(players), on_moment))
     return [next(played)[0] if p.rehearsed is None else p.rehearsed.states for p in players]
 
 
@@ -189,7 +198,11 @@ def _acting(players: Sequence[EpisodePlayer]) -> list[EpisodePlayer]:
 
 
 def _played(
-    env: TaskEnv, players: Sequence[EpisodePlayer], *, observed: bool = False
+    env: TaskEnv,
+    players: Sequence[EpisodePlayer],
+    on_moment: Callable[[Any], None] = lambda observation: None,
+    *,
+    observed: bool = False,
 ) -> list[tuple[States, Any]]:
     """Play, and return the states of each player's environment, and what was observed in it."""
     if not players:
@@ -199,6 +212,7 @@ def _played(
     tape = None
     for observation in happening:
         tape = tape or env.begin_tape()
+        on_moment(observation)
         env.write_tape(tape)
         for i, player in enumerate(players if observed else ()):
             if len(seen[i]) <= len(player.moments):  # it is not over since the step before

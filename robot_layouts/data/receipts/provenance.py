@@ -65,6 +65,7 @@ class _ProvenanceMaking(TypedDict):
     camera_size: Annotated[list[Annotated[int, whole(1, _MOST)]], length(2)] | None
     bystanders: Name | None
     simulator: Name
+    visuals: NotRequired[Name]
     num_envs: NotRequired[Annotated[int, whole(1, _MOST)]]
     sensor_configs: NotRequired[Object]
     enable_shadow: NotRequired[bool]
@@ -72,7 +73,11 @@ class _ProvenanceMaking(TypedDict):
 
 
 def describe_making(
-    cls: type[MultiRobotTask], scenario: Scenario, num_envs: int | None = None
+    cls: type[MultiRobotTask],
+    scenario: Scenario,
+    num_envs: int | None = None,
+    *,
+    pictures: bool = False,
 ) -> dict[str, Any]:
     """Return what a task is made with.
 
@@ -83,13 +88,14 @@ def describe_making(
         cls: Class of the task.
         scenario: What it is made with.
         num_envs: How many environments play at once, where that makes a difference.
+        pictures: Whether ``files`` are also those that are drawn.
 
     Raises:
         AssetError: If robot files cannot be found.
     """
     mode, varied = scenario.control_mode, scenario.randomization
     described = {
-        "layout": _describe_places(scenario.layout),
+        "layout": _describe_places(scenario.layout, pictures=pictures),
         "obs_mode": scenario.obs_mode,
         "reward_mode": scenario.reward_mode or cls.reward_modes[0],
         "control_mode": None if mode is None else plain_mode(mode),
@@ -101,6 +107,7 @@ def describe_making(
         "camera_size": scenario.camera_size,
         "bystanders": scenario.bystanders,
         "simulator": scenario.simulator,
+        **({} if scenario.visuals == "full" else {"visuals": scenario.visuals}),
         **({} if num_envs is None else {"num_envs": num_envs}),
         **_filled(
             sensor_configs=plain(scenario.sensor_configs),
@@ -111,13 +118,13 @@ def describe_making(
     return json.loads(json.dumps(described))
 
 
-def _describe_places(layout: Layout) -> dict[str, Any]:
+def _describe_places(layout: Layout, *, pictures: bool) -> dict[str, Any]:
     return {
         place: {
             **{name: value for name, value in about.items() if name != "assets"},
             "control_mode": layout[place].control_mode,
             "descriptor": descriptor_digest(layout[place].robot),
-            "files": asset_checksums(layout[place].robot.urdf),
+            "files": asset_checksums(layout[place].robot.urdf, pictures=pictures),
         }
         for place, about in describe_layout(layout).items()
     }
@@ -182,13 +189,13 @@ def describe_job(job: EvaluationJob, name: str | None = None) -> dict[str, Any]:
         AssetError: If robot files cannot be found.
         ReceiptError: If a file of the policy cannot be read.
     """
-    cast = job.cast
+    cast, pictures = job.cast, job.pictures is not None
     at_once = job.scenario.num_envs if is_batched(cast.policy) else None
     expert = cast.expert
     return {
         "task": describe_task(job.task),
         "policy": describe_policy(cast.policy, name) if expert is None else describe_expert(expert),
-        "making": describe_making(job.task, job.scenario, at_once),
+        "making": describe_making(job.task, job.scenario, at_once, pictures=pictures),
     }
 
 
@@ -218,12 +225,21 @@ def receipt_of(
     return Receipt(
         **described,
         environment={**first, **{name: value for name, value in more.items() if value}},
-        episodes=tuple(
-            EpisodeReceipt(
-                seed, s.success, s.steps, s.total, s.trace.states, s.trace.trace, s.reason
-            )
-            for seed, s in traced.items()
-        ),
+        episodes=tuple(_episode(seed, score) for seed, score in traced.items()),
+        pictures={} if job.pictures is None else {"interval": job.pictures.interval},
+    )
+
+
+def _episode(seed: int, score: TracedScore) -> EpisodeReceipt:
+    return EpisodeReceipt(
+        seed,
+        score.success,
+        score.steps,
+        score.total,
+        score.trace.states,
+        score.trace.trace,
+        score.reason,
+        {name: asdict(trace) for name, trace in score.pictures.items()},
     )
 
 

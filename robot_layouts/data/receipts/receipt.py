@@ -31,11 +31,12 @@ from robot_layouts.core.schema import (
     whole,
 )
 from robot_layouts.core.writing import write_whole
-from robot_layouts.data.playing.evaluation_job import BYTES
+from robot_layouts.data.playing.picture_digests import BYTES, PictureTrace
 from robot_layouts.data.reading.json_files import MAX_SEED, MAX_STEPS
 from robots import RobotLayoutsError, UnreadableFileError
 
 FORMAT = "robot-layouts receipt 1"
+FORMAT_WITH_PICTURES = "robot-layouts receipt 2"
 MAX_BYTES = 2**27  # of a file; 100,000 episodes of 200 steps take a half
 
 # A module before a task's id would be imported.
@@ -58,6 +59,16 @@ class _Environment(TypedDict):
     versions: Object
     processor: Object
     variables: NotRequired[AnyText]
+    graphics: NotRequired[Object]
+
+
+class _Pictures(TypedDict):
+    interval: Annotated[int, whole(1, MAX_STEPS)]
+
+
+class _PictureTrace(TypedDict):
+    pictures: Digest
+    trace: AnyText
 
 
 class _ReceiptEpisode(TypedDict):
@@ -68,15 +79,17 @@ class _ReceiptEpisode(TypedDict):
     states: Digest
     trace: AnyText
     reason: NotRequired[AnyText]
+    pictures: NotRequired[dict[Name, _PictureTrace]]
 
 
 class _Receipt(TypedDict):
-    format: Annotated[str, exactly(FORMAT)]
+    format: Annotated[str, exactly(FORMAT, FORMAT_WITH_PICTURES)]
     hash: Digest
     task: _Task
     policy: _Policy
     making: _Making
     environment: _Environment
+    pictures: NotRequired[_Pictures]
     episodes: list[_ReceiptEpisode]
 
 
@@ -96,6 +109,9 @@ class EpisodeReceipt:
         states: SHA-256, in hex, over all states: after the reset and after each step.
         trace: The first two bytes of that digest as it stood at each of these moments, in base64.
         reason: Why it failed, in words, if that is known; of an expert, it is.
+        pictures: Of the pictures that were observed, by camera and texture, such as
+            ``base_camera/rgb``: ``pictures``, a SHA-256 in hex over the SHA-256 of each, and
+            ``trace``, the first two bytes of each, in base64.
     """
 
     seed: int
@@ -105,6 +121,9 @@ class EpisodeReceipt:
     states: str
     trace: str
     reason: str = ""
+    pictures: Mapping[str, Mapping[str, str]] = field(
+        default_factory=dict[str, Mapping[str, str]], hash=False
+    )
 
     def __post_init__(self) -> None:
         """Refuse values that no episode has.
@@ -114,11 +133,7 @@ class EpisodeReceipt:
         """
         about = f"the episode of seed {self.seed!r}"
         vars(self).update(check(asdict(self), _ReceiptEpisode, about, ReceiptError))
-        try:
-            length = len(b64decode(self.trace, validate=True))
-        except (NotBase64, ValueError):
-            length = -1
-        if length != BYTES * (self.steps + 1):
+        if _length(self.trace) != BYTES * (self.steps + 1):
             raise ReceiptError(
                 f"the episode of seed {self.seed}: its trace must be {BYTES * (self.steps + 1)}"
                 f" bytes in base64, {BYTES} for the reset and for each of {self.steps} steps"
@@ -126,7 +141,15 @@ class EpisodeReceipt:
 
     def digests(self) -> NDArray[np.uint8]:
         """Return the first bytes of the digest after the reset and each step, (steps + 1, 2)."""
-        return np.frombuffer(b64decode(self.trace), np.uint8).reshape(-1, BYTES)
+        return _rows(self.trace)
+
+    def picture_digests(self) -> dict[str, NDArray[np.uint8]]:
+        """Return the first bytes of the digest of each picture, (M, 2), by camera and texture."""
+        return {name: _rows(about["trace"]) for name, about in self.pictures.items()}
+
+    def picture_trace(self, name: str) -> PictureTrace:
+        """Return what identifies the pictures of one camera and texture."""
+        return PictureTrace(**self.pictures[name])
 
 
 @dataclass(frozen=True)
@@ -143,8 +166,12 @@ class Receipt:
         environment: ``versions`` and ``processor`` of where it was played; see
             `environment`. ``others``, if workers differed; ``guessed``, where the
             files of robots were that no registry knows; ``variables``, names of environment
-            variables that the policy's source reads and that were set.
+            variables that the policy's source reads and that were set; ``graphics``, on what
+            pictures were drawn, see
+            `robot_layouts.simulation.backend.Backend.describe_graphics`.
         episodes: One for each seed, in the order in which these were given.
+        pictures: ``interval``: pictures after the reset and each so many-th control step have a
+            digest. Empty if none have.
         claimed: The hash that a file says it has; empty if it comes from no file.
     """
 
@@ -153,6 +180,7 @@ class Receipt:
     making: Mapping[str, Any]
     environment: Mapping[str, Any]
     episodes: tuple[EpisodeReceipt, ...]
+    pictures: Mapping[str, Any] = field(default_factory=dict[str, Any])
     claimed: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
@@ -169,6 +197,24 @@ class Receipt:
             raise ReceiptError("a receipt has one episode or more; this has none")
         if twice := [seed for seed, count in seeds.items() if count > 1]:
             raise ReceiptError(f"a receipt has each seed once; this has seed {twice[0]} twice")
+        if self.pictures:
+            check(self.pictures, _Pictures, "pictures", ReceiptError)
+        for episode in self.episodes:
+            self._check_pictures(episode)
+
+    def _check_pictures(self, episode: EpisodeReceipt) -> None:
+        if episode.pictures and not self.pictures:
+            raise ReceiptError(
+                f"the episode of seed {episode.seed} has digests of pictures, and the receipt does"
+                ' not say of which; "pictures" must say their "interval"'
+            )
+        for name, about in episode.pictures.items():
+            moments = episode.steps // self.pictures["interval"] + 1
+            if _length(about["trace"]) != BYTES * moments:
+                raise ReceiptError(
+                    f"the episode of seed {episode.seed}: the trace of its pictures {name} must be"
+                    f" {BYTES * moments} bytes in base64, {BYTES} for each of {moments}"
+                )
 
     @property
     def hash(self) -> str:
@@ -191,7 +237,8 @@ class Receipt:
         Raises:
             UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
-        head = {"format": FORMAT, "hash": self.hash, **self._content()}
+        form = FORMAT_WITH_PICTURES if self.pictures else FORMAT
+        head = {"format": form, "hash": self.hash, **self._content()}
         head["environment"] = self.environment
         episodes = ",\n".join(f"  {json.dumps(episode)}" for episode in head.pop("episodes"))
         text = json.dumps(head, indent=1).removesuffix("\n}")
@@ -209,7 +256,12 @@ class Receipt:
             check(found, _Receipt, "")
             episodes = tuple(_episode(about) for about in found["episodes"])
             parts = {name: found[name] for name in ("task", "policy", "making", "environment")}
-            return cls(**parts, episodes=episodes, claimed=found["hash"])
+            return cls(
+                **parts,
+                episodes=episodes,
+                pictures=found.get("pictures", {}),
+                claimed=found["hash"],
+            )
         except UnreadableFileError as error:
             raise ReceiptError(str(error)) from error
         except (FieldError, ReceiptError) as error:
@@ -221,18 +273,31 @@ class Receipt:
             "task": self.task,
             "policy": self.policy,
             "making": self.making,
+            **({"pictures": self.pictures} if self.pictures else {}),
             "episodes": [_brief(episode) for episode in self.episodes],
         }
 
 
 def _brief(episode: EpisodeReceipt) -> dict[str, Any]:
-    """Return an episode as plain data, without a reason if there is none."""
-    return {name: value for name, value in asdict(episode).items() if value != ""}
+    """Return an episode as plain data, without a reason or pictures if there are none."""
+    return {name: value for name, value in asdict(episode).items() if value not in ("", {})}
 
 
 def _episode(about: Mapping[str, Any]) -> EpisodeReceipt:
     names = EpisodeReceipt.__dataclass_fields__
     return EpisodeReceipt(**{name: about[name] for name in names if name in about})
+
+
+def _length(trace: str) -> int:
+    """Return how many bytes a trace has; -1 if it is not base64."""
+    try:
+        return len(b64decode(trace, validate=True))
+    except (NotBase64, ValueError):
+        return -1
+
+
+def _rows(trace: str) -> NDArray[np.uint8]:
+    return np.frombuffer(b64decode(trace), np.uint8).reshape(-1, BYTES)
 
 
 def _hash(content: Mapping[str, Any]) -> str:

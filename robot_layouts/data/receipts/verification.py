@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
+from pathlib import Path
 from shlex import quote
 from typing import Any
+
+import numpy as np
 
 from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_whole
 from robot_layouts.data.actors import EXPERT
-from robot_layouts.data.playing.evaluation_job import EvaluationJob, scores_of
+from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore, scores_of
 from robot_layouts.data.playing.executor import Executor, choose_executor
+from robot_layouts.data.playing.picture_digests import BYTES, Images, WatchedPictures
 from robot_layouts.data.playing.replay import first_row
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.together import cast_of, grouped
+from robot_layouts.data.receipts.pictures import (
+    PictureDifference,
+    kept,
+    side_by_side,
+    write_png,
+)
 from robot_layouts.data.receipts.provenance import describe_job, make_again, receipt_of
 from robot_layouts.data.receipts.receipt import EpisodeReceipt, Receipt, ReceiptError
 from robots import RobotLayoutsError
@@ -30,6 +41,7 @@ _SHOWN = 60  # characters of a value
 _DIGITS = 12  # of a SHA-256
 _Path = tuple[str, ...]  # keys of a receipt's json
 _NAMED = 10  # episodes that a text names
+_NO_PICTURES = np.zeros((0, BYTES), np.uint8)
 
 
 @dataclass(frozen=True)
@@ -42,12 +54,14 @@ class EpisodeDifference:
             states are the same and only other fields are not.
         recorded: The episode in the receipt.
         here: The episode that was played here.
+        pictures: The pictures that differ, those of the first moment first.
     """
 
     seed: int
     step: int | None
     recorded: EpisodeReceipt
     here: EpisodeReceipt
+    pictures: tuple[PictureDifference, ...] = ()
 
     def __str__(self) -> str:
         """Name the step, and all that differs besides."""
@@ -61,7 +75,7 @@ class EpisodeDifference:
             for name, (before, now) in pairs.items()
             if before != now
         ]
-        return "; ".join([f"seed {self.seed}: {where}", *others])
+        return "; ".join([f"seed {self.seed}: {where}", *map(str, self.pictures), *others])
 
 
 @dataclass(frozen=True)
@@ -69,8 +83,9 @@ class Change:
     """Something that episodes depend on, and that is not what the receipt says.
 
     Attributes:
-        about: ``"version"``, ``"processor"``, ``"file"`` (of a robot), ``"policy"``, ``"task"``,
-            ``"making"``, ``"variable"`` (of the environment) or ``"receipt"``.
+        about: ``"version"``, ``"processor"``, ``"graphics"``, ``"file"`` (of a robot),
+            ``"policy"``, ``"task"``, ``"making"``, ``"variable"`` (of the environment) or
+            ``"receipt"``.
         name: Which.
         recorded: What the receipt says; None if nothing.
         here: What it is here; None if it does not exist.
@@ -86,13 +101,40 @@ class Change:
         return f"{self.name}: {_shown(self.recorded)} in the receipt, {_shown(self.here)} here"
 
 
-def episode_differences(recorded: Receipt, here: Receipt) -> Iterator[EpisodeDifference]:
-    """Yield the episodes that are not the same, in the order of the receipt; both have all."""
+def episode_differences(
+    recorded: Receipt, here: Receipt, images: Mapping[int, Images]
+) -> Iterator[EpisodeDifference]:
+    """Yield the episodes that are not the same, in the order of the receipt; both have all.
+
+    Args:
+        recorded: The receipt.
+        here: That of what was played here.
+        images: By seed, the first picture of each camera and texture that differs.
+    """
     played = {episode.seed: episode for episode in here.episodes}
+    interval = recorded.pictures.get("interval", 1)
     for before in recorded.episodes:
-        now = played[before.seed]
+        now, seed = played[before.seed], before.seed
         if before != now:
-            yield EpisodeDifference(before.seed, first_step(before, now), before, now)
+            drawn = _picture_differences(before, now, interval, images.get(seed, {}))
+            pictures = sorted(drawn, key=lambda one: before.steps if one.step is None else one.step)
+            step = first_step(before, now)
+            yield EpisodeDifference(seed, step, before, now, tuple(pictures))
+
+
+def _picture_differences(
+    before: EpisodeReceipt, now: EpisodeReceipt, interval: int, images: Images
+) -> Iterator[PictureDifference]:
+    then, drawn = before.picture_digests(), now.picture_digests()
+    for name in dict.fromkeys([*then, *drawn]):
+        if before.pictures.get(name) == now.pictures.get(name):
+            continue
+        old, new = then.get(name, _NO_PICTURES), drawn.get(name, _NO_PICTURES)
+        compared = min(len(old), len(new))
+        different = np.flatnonzero((old[:compared] != new[:compared]).any(1))
+        first = int(different[0]) * interval if len(different) else None
+        here = next(iter(images.get(name, {}).values()), None)
+        yield PictureDifference(name, first, len(different), compared, here)
 
 
 def first_step(before: EpisodeReceipt, now: EpisodeReceipt) -> int | None:
@@ -131,6 +173,8 @@ def _named(path: _Path, receipt: Receipt) -> tuple[str, str] | None:
             return "making", f"descriptor of the robot {place}"
         case ("making", *rest):
             return "making", ".".join(rest)
+        case ("environment", "graphics", name):
+            return "graphics", f"graphics, {name}"
         case ("environment", "variables"):
             return "variable", "environment variables that the policy reads"
         case ("environment", "versions", package):
@@ -178,10 +222,12 @@ class Verification:
     Attributes:
         receipt: The receipt.
         here: The receipt of what was played here.
+        images: By seed, the first picture of each camera and texture that differs, as drawn here.
     """
 
     receipt: Receipt
     here: Receipt
+    images: Mapping[int, Images] = field(default_factory=dict[int, Images], compare=False)
 
     @property
     def equal(self) -> bool:
@@ -191,12 +237,49 @@ class Verification:
     @cached_property
     def differences(self) -> tuple[EpisodeDifference, ...]:
         """The episodes that were not the same, in the receipt's order."""
-        return tuple(episode_differences(self.receipt, self.here))
+        return tuple(episode_differences(self.receipt, self.here, self.images))
 
     @cached_property
     def changed(self) -> tuple[Change, ...]:
         """What they depend on and is not as in the receipt: versions, files, processor, …."""
         return tuple(changes(self.receipt, self.here))
+
+    def write_pictures(
+        self, folder: str | PathLike[str], kept_in: str | PathLike[str] | None = None
+    ) -> list[Path]:
+        """Write the first picture of each camera and texture that differs, of some episodes.
+
+        Where the picture of then was kept, it is on the left, that of now beside it, and on the
+        right, in white, the pixels that differ. Otherwise it is the picture of now alone.
+
+        Args:
+            folder: Where to write png files.
+            kept_in: The folder of the pictures of then, NAME.pictures beside NAME.json. Of these
+                only such are shown as have the receipt's digests.
+
+        Returns:
+            The files; none if no picture differs.
+
+        Raises:
+            UnwritableFileError: If they cannot be written.
+        """
+        interval, written = self.receipt.pictures.get("interval", 1), list[Path]()
+        for episode in self.differences[:_NAMED]:
+            for one in episode.pictures:
+                if one.here is None or one.step is None:
+                    continue
+                then = None
+                if kept_in is not None:
+                    trace = episode.recorded.picture_trace(one.name)
+                    rows = kept(Path(kept_in), episode.seed, one.name, trace)
+                    then = None if rows is None else rows[one.step // interval]
+                pixels = side_by_side(one.name, then, one.here)
+                if pixels is not None:
+                    name = re.sub(r"[^\w.-]", "_", one.name)
+                    path = Path(folder) / f"seed_{episode.seed}_step_{one.step}_{name}.png"
+                    write_png(path, pixels)
+                    written.append(path)
+        return written
 
     def __repr__(self) -> str:
         """Show it as a few lines."""
@@ -267,12 +350,27 @@ def verify(
         except RobotLayoutsError as error:
             raise ReceiptError(f"the receipt's task cannot be made here: {error}") from error
         most_steps = {episode.seed: episode.steps + 1 for episode in recorded.episodes}
-        job = EvaluationJob(cls, scenario, cast, grouped(seeds, at_once), True, most_steps)
-        described = describe_job(job, name)
-        scores = scores_of(choose_executor(workers, executor), job, on_event)
-        return Verification(
-            recorded, receipt_of(described, job, {seed: scores[seed] for seed in seeds})
-        )
+        together = grouped(seeds, at_once)
+        watched = _watched(recorded)
+        job = EvaluationJob(cls, scenario, cast, together, True, most_steps, watched)
+        described, images = describe_job(job, name), dict[int, Images]()
+
+        def look(event: Event) -> None:
+            if event.seed is not None and isinstance(event.result, TracedScore):
+                images[event.seed] = event.result.images
+            on_event(event)
+
+        scores = scores_of(choose_executor(workers, executor), job, look)
+        here = receipt_of(described, job, {seed: scores[seed] for seed in seeds})
+        return Verification(recorded, here, images)
+
+
+def _watched(receipt: Receipt) -> WatchedPictures | None:
+    """Return which pictures to compare; None if the receipt has no digests of any."""
+    if not receipt.pictures:
+        return None
+    expected = {episode.seed: episode.picture_digests() for episode in receipt.episodes}
+    return WatchedPictures(receipt.pictures["interval"], expected=expected)
 
 
 @contextmanager

@@ -30,6 +30,7 @@ from robot_layouts.simulation.sapien3.contacts import (
     overlaps_in,
     presses_on_object,
 )
+from robot_layouts.simulation.sapien3.device import describe_graphics
 from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
 from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world, vary
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
@@ -174,6 +175,10 @@ class SapienBackend:
         )
 
         return look(self.worlds[env], cameras, textures, markers=markers)
+
+    def describe_graphics(self) -> dict[str, str]:
+        """Return on what pictures are drawn; see `Backend`."""
+        return describe_graphics(self.worlds[0].scene.render_system.device.name)
 
     def segments(self) -> dict[int, Part]:
         """Return what segmentation's numbers stand for; see `Backend`."""

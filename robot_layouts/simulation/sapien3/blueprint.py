@@ -24,6 +24,8 @@ from robot_layouts.simulation.sapien3.collision_groups import (
     common_bits,
     overlap_words,
 )
+from robot_layouts.simulation.sapien3.light_meshes import FINISH
+from robot_layouts.simulation.world import Visuals
 from robots import AssetError, RobotDescriptor, UnknownNameError
 from robots.urdf.mesh_files import has_body, load_scene
 from robots.urdf.model import ModelJoint, UrdfModel, UrdfShape
@@ -92,20 +94,21 @@ class Blueprint:
         return articulation
 
 
-def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
+def read_blueprint(descriptor: RobotDescriptor, *, visuals: Visuals) -> Blueprint:
     """Read a robot's files, once for any number of worlds with the same physics settings.
 
     Args:
         descriptor: The robot.
-        visuals: Whether to read what pictures need.
+        visuals: Whether to read what pictures need, and which meshes to draw.
 
     Raises:
         AssetError: If its files cannot be found, or are invalid.
-        MissingPackageError: If a mesh cannot be read because a package is missing.
+        MissingPackageError: If a mesh cannot be read, or made lighter, because a package is
+            missing.
         UnknownNameError: If ``allowed_collisions`` or ``no_floor_contact`` names a link that the
             URDF lacks.
     """
-    urdf = descriptor.urdf.locate(pictures=visuals)
+    urdf = descriptor.urdf.locate(pictures=bool(visuals))
     contents = read_urdf(urdf)
     model = read_model(contents, urdf.as_posix())
     for link in descriptor.no_floor_contact:
@@ -113,7 +116,7 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
             raise UnknownNameError(
                 f"link in no_floor_contact of {descriptor.name}", link, model.links
             )
-    _expect_meshes(model, urdf, visuals=visuals)
+    _expect_meshes(model, urdf, visuals=bool(visuals))
     from_srdf = descriptor.allowed_collisions is None
     if from_srdf:
         overlaps = common_bits(_pairs(read_excluded_pairs(urdf), model, urdf))
@@ -131,11 +134,12 @@ def read_blueprint(descriptor: RobotDescriptor, *, visuals: bool) -> Blueprint:
 
 
 def _copied(material: Any) -> Any:
-    """Return a URDF's material for one articulation alone, which can be painted by itself."""
+    """Return a material for one articulation alone, which can be painted by itself."""
     if material is None:
         return None
-    own = type(material)(base_color=material.base_color)
-    own.base_color_texture = material.base_color_texture
+    own = type(material)()
+    for name in ("base_color_texture", *FINISH):
+        setattr(own, name, getattr(material, name))
     return own
 
 

@@ -21,6 +21,8 @@ from sapien.physx import PhysxMaterial
 from sapien.wrapper.articulation_builder import ArticulationBuilder
 
 from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.simulation.sapien3.light_meshes import light_parts
+from robot_layouts.simulation.world import Visuals
 from robots import AssetError, GripperMaterial
 from robots.urdf.mesh_files import read_corners
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel, UrdfShape
@@ -35,7 +37,12 @@ _ALONG_Z = sapien.Pose(q=[0.7071068, 0, 0.7071068, 0])
 
 
 def make_builder(
-    model: UrdfModel, root: Element, urdf: str, material: GripperMaterial | None, *, visuals: bool
+    model: UrdfModel,
+    root: Element,
+    urdf: str,
+    material: GripperMaterial | None,
+    *,
+    visuals: Visuals,
 ) -> Any:
     """Return SAPIEN's builder of a robot whose base is fixed; no joint of it mimics another yet.
 
@@ -44,10 +51,11 @@ def make_builder(
         root: Its ``<robot>``, which the model was read from.
         urdf: Its path, for what it refers to.
         material: What its fingers are made of; None is SAPIEN's default.
-        visuals: Whether to give it what pictures need.
+        visuals: Whether to give it what pictures need, and which meshes.
 
     Raises:
         AssetError: If it has no joints, or a mesh that is to be mirrored cannot be read.
+        MissingPackageError: If a package that makes light meshes is missing.
     """
     if not model.joints:
         raise AssetError(f"{urdf} describes a single link; a robot has at least one joint")
@@ -70,7 +78,8 @@ def make_builder(
             _add_shape(link, "collision", shape, text, urdf, **_contact(own))
         for shape, text in _shapes(links[name], "visual", model.visuals) if visuals else ():
             finish = {"material": _finish(text, materials, urdf), "name": text.get("name", "")}
-            _add_shape(link, "visual", shape, text, urdf, **finish)
+            if not (visuals == "light" and _add_light(link, shape, text, urdf, **finish)):
+                _add_shape(link, "visual", shape, text, urdf, **finish)
     return builder
 
 
@@ -140,6 +149,19 @@ def _add_shape(
         case _:
             radius, length = shape.sizes
             getattr(link, f"add_{shape.kind}_{kind}")(pose * _ALONG_Z, radius, length / 2, **more)
+
+
+def _add_light(
+    link: Any, shape: UrdfShape, text: Element, urdf: str, material: Any, name: str
+) -> bool:
+    """Add a mesh that is drawn with fewer triangles, and tell whether there is one."""
+    if shape.kind != "mesh":
+        return False
+    parts = light_parts(resolve(shape.file, urdf, os.path.isfile), shape.sizes)
+    for part in parts:
+        own = part.material() if material is None else material
+        link.add_visual_from_file(part.file, _origin(text), (1.0, 1.0, 1.0), own, name)
+    return bool(parts)
 
 
 def _contact(material: GripperMaterial | None) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from robots.descriptor import Vector3
 
 _PLANE_HALF_SIZE = 50.0  # of what is drawn of an infinite plane (m)
 _MIPMAPS = 4  # of a floor's texture, as in mani_skill 3.0.1, utils/building/ground.py
-_TEXTURES = ("base_color", "normal", "emission", "transmission", "metallic", "roughness")
+TEXTURES = ("base_color", "normal", "emission", "transmission", "metallic", "roughness")
 
 
 def visual_component(shapes: tuple[Shape, ...]) -> RenderBodyComponent | None:
@@ -113,7 +113,7 @@ def _mesh(shape: Mesh) -> RenderShapeTriangleMesh:
     if not shape.textured:
         for part in mesh.parts:
             part.material.set_base_color(list(shape.color))
-            for texture in _TEXTURES:
+            for texture in TEXTURES:
                 getattr(part.material, f"set_{texture}_texture")(None)
     return mesh
 

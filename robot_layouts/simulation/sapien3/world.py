@@ -21,7 +21,7 @@ from robot_layouts.simulation.sapien3.robot import SimulatedRobot
 from robot_layouts.simulation.scene.looks import AS_DECLARED
 from robot_layouts.simulation.scene.parts import Part
 from robot_layouts.simulation.scene.variation import Variation
-from robot_layouts.simulation.world import World, WorldBody
+from robot_layouts.simulation.world import Visuals, World, WorldBody
 from robots import RobotDescriptor, SimulationError
 
 _Value = TypeVar("_Value")
@@ -93,7 +93,7 @@ class BuiltWorld:
         layout: Layout,
         physics: PhysicsSettings | None = None,
         *,
-        visuals: bool = False,
+        visuals: Visuals = False,
         blueprints: dict[RobotDescriptor, Blueprint] | None = None,
         links_pass: bool = False,
     ) -> None:
@@ -114,7 +114,7 @@ class BuiltWorld:
         """
         self.layout = layout
         self.physics = SAPIEN_DEFAULTS if physics is None else physics
-        self.visuals = visuals
+        self.visuals: Visuals = visuals
         if is_portable():
             divide_exactly()
         apply_settings(self.physics)
@@ -262,7 +262,7 @@ def _render_system() -> Any:
 
 
 def build_scene(
-    layout: Layout, physics: PhysicsSettings | None = None, *, visuals: bool = False
+    layout: Layout, physics: PhysicsSettings | None = None, *, visuals: Visuals = False
 ) -> sapien.Scene:
     """Build a SAPIEN scene with a layout's robots and nothing else.
 

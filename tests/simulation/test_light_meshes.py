@@ -1,0 +1,187 @@
+"""Meshes with fewer triangles look the same, and nothing else changes."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+
+import tasks
+from robot_layouts.data.receipts.provenance import describe_making
+from robot_layouts.simulation.sapien3 import light_meshes
+from robots import MissingPackageError, RobotRegistry, TaskError
+from robots.urdf.paths import resolve
+from robots.urdf.reading import read_model
+from robots.urdf.summary import read_urdf
+from tasks.registry import scenario_of
+
+pytest.importorskip("fast_simplification")
+pytestmark = pytest.mark.usefixtures("renderer")
+
+
+@pytest.fixture(autouse=True)
+def forgets():
+    """Let every test look for files again."""
+    light_meshes._parts.cache_clear()
+    yield
+    light_meshes._parts.cache_clear()
+
+
+@pytest.fixture
+def made_here(monkeypatch, tmp_path) -> Path:
+    monkeypatch.setattr(light_meshes, "default_root", lambda: tmp_path)
+    return tmp_path
+
+
+def mesh_of(robot: str, link: str) -> str:
+    urdf = RobotRegistry.load(robot).urdf.locate(pictures=True)
+    model = read_model(read_urdf(urdf), urdf.as_posix())
+    return resolve(model.visuals[link][0].file, urdf.as_posix(), os.path.isfile)
+
+
+def bumpy(tmp_path, name="bumpy.ply") -> Path:
+    """Return a ball of 10 cm with 20,480 triangles, its surface a little wavy."""
+    ball = trimesh.creation.icosphere(5, 0.05)
+    ball.vertices *= 1 + 0.002 * np.sin(ball.vertices[:, :1] * 300)
+    path = tmp_path / name
+    ball.export(path)
+    return path
+
+
+def farthest(points_of, surface) -> float:
+    """Return the distance (m) of points of one mesh from another, by trimesh's own search."""
+    sampled = trimesh.sample.sample_surface(points_of, 1500, seed=7)[0]
+    points = np.concatenate([sampled, points_of.vertices[::3]])
+    return float(trimesh.proximity.closest_point(surface, points)[1].max())
+
+
+@pytest.mark.parametrize("link", ["panda_link1", "panda_hand"])
+def test_no_point_is_1_mm_away(made_here, link):
+    from sapien.render import RenderShapeTriangleMesh
+
+    path = mesh_of("panda", link)
+    whole = RenderShapeTriangleMesh(path, [1, 1, 1], None).parts
+    parts = light_meshes.light_parts(path, (1.0, 1.0, 1.0))
+    assert len(parts) == len(whole)
+    for part, own in zip(parts, whole, strict=True):
+        before = trimesh.Trimesh(own.vertices, own.triangles, process=False)
+        now = trimesh.load_mesh(part.file, process=False)
+        assert len(now.faces) < len(before.faces) / 1.5
+        assert farthest(now, before) < 1e-3
+        assert farthest(before, now) < 1e-3
+        for name in ("base_color", "metallic", "roughness", "specular"):
+            assert getattr(part.material(), name) == getattr(own.material, name)
+
+
+def test_it_is_smooth_and_faces_outwards(made_here, tmp_path):
+    """Also if it is mirrored and stretched."""
+    path = bumpy(tmp_path)
+    for scale in ((1.0, 1.0, 1.0), (-2.0, 1.0, 0.5)):
+        (part,) = light_meshes.light_parts(str(path), scale)
+        mesh = trimesh.load_mesh(part.file, process=False)
+        assert len(mesh.faces) < 5000
+        assert mesh.volume == pytest.approx(4 / 3 * np.pi * 0.05**3, rel=0.05)
+        outwards = mesh.vertices / np.array(scale) ** 2  # of an ellipsoid
+        outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
+        assert ((mesh.vertex_normals * outwards).sum(1) > 0.8).all()
+
+
+def test_a_hole_is_not_closed_nor_a_small_piece_lost(made_here, tmp_path):
+    tube = trimesh.creation.annulus(0.004, 0.006, 0.1, sections=400)
+    speck = trimesh.creation.icosphere(4, 0.002)
+    speck.apply_translation([0.05, 0, 0])
+    whole = trimesh.util.concatenate([tube, speck])
+    whole.export(tmp_path / "tube.ply")
+    (part,) = light_meshes.light_parts(str(tmp_path / "tube.ply"), (1.0, 1.0, 1.0))
+    now = trimesh.load_mesh(part.file, process=False)
+    assert len(now.faces) < len(whole.faces) / 2
+    assert farthest(now, whole) < 1e-3
+    assert farthest(whole, now) < 1e-3
+
+
+def test_few_triangles_and_textures_stay(made_here, tmp_path):
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    box.export(tmp_path / "box.ply")
+    assert light_meshes.light_parts(str(tmp_path / "box.ply"), (1.0, 1.0, 1.0)) == ()
+    from PIL import Image
+
+    ball = trimesh.creation.icosphere(5, 0.05)
+    image = Image.new("RGB", (4, 4), (200, 10, 10))
+    ball.visual = trimesh.visual.TextureVisuals(uv=ball.vertices[:, :2], image=image)
+    ball.export(tmp_path / "ball.glb")
+    assert light_meshes.light_parts(str(tmp_path / "ball.glb"), (1.0, 1.0, 1.0)) == ()
+
+
+def test_it_is_made_once_and_again_if_the_file_changes(made_here, tmp_path, monkeypatch):
+    path = bumpy(tmp_path)
+    first = light_meshes.light_parts(str(path), (1.0, 1.0, 1.0))
+    light_meshes._parts.cache_clear()
+    monkeypatch.setattr(light_meshes, "find_spec", lambda name: None)
+    assert light_meshes.light_parts(str(path), (1.0, 1.0, 1.0)) == first  # nothing is needed
+    trimesh.creation.icosphere(5, 0.04).export(path)
+    os.utime(path, ns=(1, 1))
+    with pytest.raises(
+        MissingPackageError,
+        match=r"need fast_simplification and scipy: pip install 'robot-layouts\[light\]'",
+    ):
+        light_meshes.light_parts(str(path), (1.0, 1.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def pictures(renderer):
+    """What the task's camera and the robot's see after three steps, and the states."""
+    found = {}
+    for visuals in ("full", "light"):
+        env = tasks.make("PickCube-v1", obs_mode="rgb+segmentation", visuals=visuals)
+        obs, _ = env.reset(seed=3)
+        for _ in range(3):
+            obs, *_ = env.step(torch.full((1, 8), 0.4))
+        found[visuals] = obs["sensor_data"]["base_camera"], env.get_state_dict(), env
+    return found
+
+
+def test_pictures_are_nearly_the_same(pictures):
+    (full, _, _), (light, _, _) = pictures["full"], pictures["light"]
+    segments = (full["segmentation"] != light["segmentation"]).float().mean()
+    assert 0 < segments < 0.005
+    shades = (full["rgb"].int() - light["rgb"].int()).abs().amax(-1)
+    assert (shades > 30).float().mean() < 0.02
+
+
+def test_states_are_the_same(pictures):
+    (_, full, _), (_, light, _) = pictures["full"], pictures["light"]
+    for kind, entries in full.items():
+        for name, rows in entries.items():
+            assert torch.equal(rows, light[kind][name])
+
+
+def test_far_fewer_triangles_are_drawn(pictures):
+    from robot_layouts.simulation.sapien3.backend import worlds_below
+
+    def triangles(env) -> int:
+        robot = worlds_below(env.simulation)[0].robots["arm"]
+        shapes = (
+            shape
+            for link in robot.articulation.links
+            for component in link.entity.components
+            for shape in getattr(component, "render_shapes", ())
+        )
+        return sum(len(part.triangles) for shape in shapes for part in shape.parts)
+
+    full, light = (triangles(pictures[visuals][2]) for visuals in ("full", "light"))
+    assert full > 130_000
+    assert light < full / 4
+
+
+def test_what_visuals_there_are():
+    with pytest.raises(TaskError, match="visuals 'lite' is not offered; choices: 'full', 'light'"):
+        tasks.make("PickCube-v1", obs_mode="rgb", visuals="lite")
+
+
+def test_a_receipt_says_so():
+    cls, light = scenario_of("PickCube-v1", 1, obs_mode="rgb", visuals="light")
+    assert describe_making(cls, light)["visuals"] == "light"
+    cls, full = scenario_of("PickCube-v1", 1, obs_mode="rgb")
+    assert "visuals" not in describe_making(cls, full)
