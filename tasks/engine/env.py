@@ -150,6 +150,7 @@ class TaskEnv(Remade):
         self._reader = ActionReader(self.layout, self.num_envs)
         observed = read_mode(scenario.obs_mode)
         self._touch = Touch(touch_links(layout, scenario.touch))
+        self._feels = bool(self._touch.names)
         cameras = scenario.cameras or task.cameras
         size = scenario.camera_size
         self.observer = Observer(
@@ -408,7 +409,9 @@ class TaskEnv(Remade):
     def flat_state(self) -> Floats:
         """Return what ``obs_mode="state"`` observes, (N, D), whatever the task's own mode is."""
         state = self._state
-        parts = self._parts(state, self._info(state))
+        parts = self.task.observe(state, self._info(state))
+        if self._feels:
+            parts = self._with_touch(parts, state)
         observer = Observer(self.layout, read_mode("state"), (), (), self.task.viewpoint)
         return observer.observe(self.simulation, state, parts)
 
@@ -507,7 +510,9 @@ class TaskEnv(Remade):
         with unchanged(state, f"{name}.evaluate()"):
             info = self._info(state)
         with unchanged(state, f"{name}.observe()"):
-            parts = {} if mode.nothing else self._parts(state, info)
+            parts = {} if mode.nothing else self._observed.checked(self.task.observe(state, info))
+        if self._feels and not mode.nothing:
+            parts = self._with_touch(parts, state)
         self.observation_slices = self.observer.slices(self.simulation, state, parts)
         self.single_observation_space = space_of(self.start[0], batched=True)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -528,11 +533,8 @@ class TaskEnv(Remade):
             info |= {f"{arm}.shortfall": rows.copy() for arm, rows in modes.shortfalls.items()}
         return info
 
-    def _parts(self, state: State, info: Info) -> Mapping[str, Array]:
-        """Return the named parts of the observation: those of the task, and what links feel."""
-        parts = self._observed.checked(self.task.observe(state, info))
-        if not self._touch.names:
-            return parts
+    def _with_touch(self, parts: Mapping[str, Array], state: State) -> dict[str, Array]:
+        """Return the parts that the task observes, and after them what links feel."""
         return {**parts, **self._touch.read(state, self._elapsed)}
 
     def _observation(self, state: State, info: Info, ids: Sequence[int]) -> Any:
@@ -540,7 +542,9 @@ class TaskEnv(Remade):
         mode = self.observer.mode
         if mode.nothing:
             return {}
-        parts = {} if mode.columns else self._parts(state, info)
+        parts = {} if mode.columns else self._observed.checked(self.task.observe(state, info))
+        if self._feels:
+            parts = self._with_touch(parts, state)
         randomizer = self._randomizer
         try:
             if randomizer is None:

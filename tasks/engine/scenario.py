@@ -72,11 +72,11 @@ class Scenario:
             `tasks.Randomization`.
         check_layout: Whether to refuse a layout whose robots collide, be it another one or the
             task's own; those of this library's tasks are checked by its tests.
-        sensor_configs: What of the cameras that observe is otherwise, as in native: of all of them ``width``,
-            ``height`` (pixels), ``fov`` (rad) or ``intrinsic`` (3, 3), ``near``, ``far`` (m),
-            ``pose`` (position and quaternion, wxyz, of the world or of the link), ``mount`` (robot
-            and link) and ``shader_pack`` (``"minimal"``, ``"default"``, ``"rt"``, ``"rt-med"`` or
-            ``"rt-fast"``), and by a camera's name a mapping of its own.
+        sensor_configs: What of the cameras that observe is otherwise, as in native: of all of them
+            ``width``, ``height`` (pixels), ``fov`` (rad) or ``intrinsic`` (3, 3), ``near``, ``far``
+            (m), ``pose`` (position and quaternion, wxyz, of the world or of the link), ``mount``
+            (robot and link) and ``shader_pack`` (``"minimal"``, ``"default"``, ``"rt"``,
+            ``"rt-med"`` or ``"rt-fast"``), and by a camera's name a mapping of its own.
         human_render_camera_configs: Likewise of the camera that draws for people,
             ``"render_camera"``.
         enable_shadow: Whether the first light casts shadows, as in native.

@@ -169,6 +169,28 @@ def test_it_is_sensed_beside_images():
         assert env.observer.senses(NAMES[0])
 
 
+@pytest.mark.parametrize(
+    ("task_id", "robot", "touch", "names"),
+    [
+        (
+            "TwoRobotPickCube-v1",
+            "mobile_panda_dual",
+            True,
+            [f"robot.{arm}.touch.{arm}_{link}" for arm in ("left", "right") for link in FINGERS],
+        ),
+        (
+            "PushCube-v1",
+            "xarm7_ability",
+            {"arm": ("thumb_L2", "index_L2")},
+            ["arm.touch.thumb_L2", "arm.touch.index_L2"],
+        ),
+    ],
+)
+def test_limbs_and_hands_feel(task_id: str, robot: str, touch: Any, names: list[str]):
+    with closing(tasks.make(task_id, robots=robot, touch=touch, check_layout=False)) as env:
+        assert [name for name in env.observation_slices if ".touch." in name] == names
+
+
 def test_interfaces_pass_on_what_is_felt():
     env = gymnasium.make(f"RobotLayouts/{TASK}", touch=True)
     vec = gymnasium.make_vec(f"RobotLayouts/{TASK}", num_envs=2, num_workers=0, touch=True)
