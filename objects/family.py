@@ -14,6 +14,7 @@ from objects.descriptor import Grasp, NamedPoint, ObjectDescriptor
 from objects.shapes import Shape
 from robot_layouts.core.bounds import checked_number, checked_whole
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
+from robot_layouts.core.quoting import shown
 from robots.descriptor import IDENTITY, Quaternion
 
 SOURCE = "robot-layouts, procedural"
@@ -102,6 +103,11 @@ class Family:
             for name, (usual, low, high) in self.sizes.items()
         }
         made = self.make(**sizes)
+        if not isinstance(made, Made):
+            raise DescriptorError(
+                f"the function of the family {self.name!r} gave {shown(made)}, of type"
+                f" {type(made).__name__}; it must return a Made(parts, grasps, points, rests)"
+            )
         return ObjectDescriptor(
             name=self.name,
             about=self.about,
@@ -123,7 +129,16 @@ def family(
     Args:
         sizes: The lengths that it takes, by name.
         fits: See `Family`; None if it fits no other one.
+
+    Raises:
+        DescriptorError: If the usual length of one is not between its bounds.
     """
+    for name, (usual, low, high) in sizes.items():
+        if not 0 < low <= usual <= high:
+            raise DescriptorError(
+                f"the length {name!r} of a family is usually {usual} m, from {low} to {high} m; it"
+                " must be 0 < low <= usual <= high"
+            )
 
     def declared(make: Callable[..., Made]) -> Family:
         name = make.__name__

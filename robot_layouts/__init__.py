@@ -3,6 +3,9 @@
 What a robot is:
     RobotRegistry, RobotDescriptor: Robots by name; from a URDF, `RobotDescriptor.from_urdf`.
 
+What a thing is:
+    ObjectRegistry: Mugs, pots, tools and parts by name.
+
 Who stands where:
     Layout, Placement, single, side_by_side, face_to_face, ring, around_table, grid: A layout.
     search: Places from which robots reach what they are to reach.
@@ -41,6 +44,7 @@ if TYPE_CHECKING:
         side_by_side,
         single,
     )
+    from objects import ObjectRegistry
     from robot_layouts.data import Evaluation, evaluate, record, view
     from robot_layouts.data.reading.recording import Recording
     from robot_layouts.data.receipts import Receipt, verify
@@ -62,6 +66,7 @@ __all__ = [
     "Layout",
     "Motion",
     "MultiRobotTask",
+    "ObjectRegistry",
     "Placement",
     "Randomization",
     "Receipt",
@@ -94,6 +99,7 @@ __all__ = [
 
 _HOMES = {
     "robots": ("RobotDescriptor", "RobotLayoutsError", "RobotRegistry"),
+    "objects": ("ObjectRegistry",),
     "layouts": (
         *("Layout", "Placement", "around_table", "face_to_face", "grid", "ring", "search"),
         *("side_by_side", "single"),

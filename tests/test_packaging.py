@@ -131,7 +131,8 @@ class TestDependencies:
         assert distributions(used - {"mujoco"}) <= declared
 
     @pytest.mark.parametrize(
-        "room", ["robots", "layouts", "tasks", "robot_layouts/simulation", "robot_layouts/data"]
+        "room",
+        ["robots", "objects", "layouts", "tasks", "robot_layouts/simulation", "robot_layouts/data"],
     )
     def test_importing_a_room_needs_no_extra(self, room):
         assert distributions(imports_of(room, everywhere=False)) <= names_of(

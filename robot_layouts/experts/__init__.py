@@ -6,7 +6,8 @@ Finding experts:
 Writing one, which is a function of a task and a seed:
     first_success: Tries scripts in a private copy of the task; the actions of the first that works.
     Script, Waypoint, Scene: What each robot does, one thing after the other, in worlds as seen now.
-    pick, cube_grips, need_fingers: Waypoints that grasp a body, and where a gripper may hold it.
+    pick, cube_grips, thing_grips: Waypoints that grasp a body, and where a gripper may hold it.
+    need_fingers: Refuses robots that cannot.
     bringing, holding, held_at, is_near: Where the gripper goes with what it holds.
     gripper_facing, turn, yaw_of, heading, backed_off, planar_distance: Poses and headings.
     rehearse: A closed loop in the place of a script: a function of what is seen, at every step.
@@ -42,6 +43,7 @@ from robot_layouts.experts.grasps import (
     is_near,
     need_fingers,
     pick,
+    thing_grips,
 )
 from robot_layouts.experts.registry import Expert, find_expert, list_experts, register_expert
 from robot_layouts.experts.rehearsal import (
@@ -86,6 +88,7 @@ __all__ = [
     "register_expert",
     "rehearse",
     "search",
+    "thing_grips",
     "turn",
     "yaw_of",
 ]

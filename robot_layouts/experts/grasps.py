@@ -8,6 +8,7 @@ from math import pi
 
 import numpy as np
 
+from objects import ObjectDescriptor
 from robot_layouts.experts.geometry import (
     backed_off,
     gripper_facing,
@@ -23,6 +24,8 @@ from robots import TaskError
 from tasks import TaskEnv
 
 Numbers = Sequence[float] | Floats
+
+LEAN = pi / 3  # rad; how far a gripper leans from straight down at most where it holds a thing
 
 QUARTERS = (0, 1, 2, 3)
 
@@ -80,6 +83,38 @@ def cube_grip_from(cube: Pose, base: Floats, tilt: float) -> Pose:
     position, quaternion = cube
     direction = squared(heading(base, position), yaw_of(quaternion))
     return position, gripper_facing(direction, tilt)
+
+
+def thing_grips(
+    thing: ObjectDescriptor, body: str, opening: float, lean: float = LEAN
+) -> Callable[[Scene], list[Pose]]:
+    """Return the grips of a thing that a gripper can do, wherever the thing is.
+
+    Args:
+        thing: Says where it is grasped.
+        body: Its name in the world.
+        opening: How far the gripper opens (m).
+        lean: Most that the gripper may lean from straight down (rad).
+
+    Raises:
+        TaskError: If it opens wide enough for none.
+    """
+    grasps = thing.grasps_for(opening)
+    if not grasps:
+        raise TaskError(
+            f"a gripper that opens {opening:g} m holds {thing.name} in none of its"
+            f" {len(thing.grasps)} grasps"
+        )
+    places = np.array([grasp.position for grasp in grasps])
+    turns = np.array([grasp.quaternion for grasp in grasps])
+
+    def grips(scene: Scene) -> list[Pose]:
+        position, quaternion = scene.body(body)
+        points, frames = position + rotate(quaternion, places), multiply(quaternion, turns)
+        steep = -rotate(frames, np.array([0.0, 0.0, 1.0]))[:, 2] >= np.cos(lean)
+        return [*zip(points[steep], frames[steep], strict=True)]
+
+    return grips
 
 
 def grips_to(

@@ -7,9 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from objects import ObjectDescriptor, ObjectRegistry
-from objects.registry import CATALOGUE
-from objects.shapes import Cylinder
+from objects import Made, ObjectDescriptor, ObjectRegistry, Size, family
+from objects.registry import CATALOGUE, OBJECTS
+from objects.shapes import Box, Cylinder
 from objects.solids import bounds, surface
 from robot_layouts.kinematics.rotations import rotation_of
 from robots import DescriptorError, UnknownNameError
@@ -37,9 +37,9 @@ def test_there_are_twenty_families_at_least_and_each_is_called_as_its_function()
     assert len(CATALOGUE) >= 20
     assert list(CATALOGUE) == sorted(CATALOGUE)
     for name in CATALOGUE:
-        family = ObjectRegistry.family(name)
-        assert family.name == name
-        assert family.about
+        found = ObjectRegistry.family(name)
+        assert found.name == name
+        assert found.about
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
@@ -55,13 +55,13 @@ def test_members_are_sound(name):
 
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_a_seed_gives_one_member_between_the_bounds_and_another_seed_another(name):
-    family = ObjectRegistry.family(name)
-    assert family.member(3) == family.member(3)
-    assert family.member(3) != family.member(4)
-    assert family.usual == family() == ObjectRegistry.load(name)
+    found = ObjectRegistry.family(name)
+    assert found.member(3) == found.member(3)
+    assert found.member(3) != found.member(4)
+    assert found.usual == found() == ObjectRegistry.load(name)
     for member in members(name):
-        assert family(**member.sizes).parts == member.parts
-        for length, (_, low, high) in family.sizes.items():
+        assert found(**member.sizes).parts == member.parts
+        for length, (_, low, high) in found.sizes.items():
             assert low <= member.sizes[length] <= high
 
 
@@ -153,3 +153,29 @@ def test_a_length_that_the_family_does_not_have_is_named_with_the_closest():
     with pytest.raises(DescriptorError, match="mug: seed is -1; it must be an integer of 0"):
         mug.member(-1)
     assert mug(radius=0.04).sizes["radius"] == 0.04
+
+
+def test_a_family_of_ones_own_is_made_like_any_other(monkeypatch):
+    monkeypatch.setattr(OBJECTS, "registered", {})
+
+    @family({"side": Size(0.04, 0.02, 0.05)})
+    def die(side: float) -> Made:
+        """A die."""
+        return Made([Box((side / 2,) * 3, position=(0.0, 0.0, side / 2))])
+
+    ObjectRegistry.register(die)
+    assert ObjectRegistry.load("die").extent == pytest.approx((0.04,) * 3)
+    assert ObjectRegistry.load("die", seed=1).sizes != ObjectRegistry.load("die", seed=2).sizes
+    assert ObjectRegistry.load("die").about == "A die"
+
+
+def test_what_is_no_family_is_refused():
+    with pytest.raises(DescriptorError, match="the length 'side' of a family is usually 0.1 m"):
+        family({"side": Size(0.1, 0.02, 0.05)})
+
+    @family({})
+    def nothing():
+        """Return no thing."""
+
+    with pytest.raises(DescriptorError, match="the function of the family 'nothing' gave None"):
+        nothing()

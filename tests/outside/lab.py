@@ -37,7 +37,8 @@ def make_folder(folder: Path, *, shadows: bool = False) -> Path:
     (folder / "bin").mkdir()
     (folder / "bin" / "several").write_text(SCRIPT)
     if shadows:
-        (folder / "tasks.py").write_text("raise RuntimeError('hidden')")
+        for name in ("objects.py", "tasks.py"):
+            (folder / name).write_text("raise RuntimeError('hidden')")
         (folder / "robots").mkdir()
         (folder / "robots" / "__init__.py").write_text("")
     return folder

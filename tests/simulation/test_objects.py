@@ -83,7 +83,13 @@ def _planes(vertices, triangles):
 
 def pair(*, visuals=False):
     """A world with a box, and beside it the hull of a box's corners, of other matter than usual."""
-    rough = {"density": 500.0, "friction": Friction(0.9, 0.8, 0.1)}
+    turned = (0.9659258262890683, 0.0, 0.0, 0.25881904510252074)  # 30° about z
+    rough = {
+        "density": 500.0,
+        "friction": Friction(0.9, 0.8, 0.1),
+        "position": (0.03, 0.0, 0.02),
+        "quaternion": turned,
+    }
 
     def build(world, number):
         world.add("box", Box((0.1, 0.05, 0.02), **rough), position=(1.0, -0.3, 0.3))
@@ -97,7 +103,10 @@ def test_the_hull_of_a_boxes_corners_is_that_box():
     box, hull = (simulation.backend.worlds[0].bodies[name].component for name in ("box", "hull"))
     assert hull.mass == pytest.approx(box.mass)
     assert np.allclose(hull.inertia, box.inertia, rtol=1e-5)
+    assert np.allclose(hull.cmass_local_pose.p, (0.03, 0.0, 0.02), atol=1e-6)
     (one,), (other,) = box.collision_shapes, hull.collision_shapes
+    assert np.allclose(other.local_pose.p, one.local_pose.p)
+    assert np.allclose(other.local_pose.q, one.local_pose.q)
     assert other.collision_groups == one.collision_groups
     assert other.density == one.density
     materials = [

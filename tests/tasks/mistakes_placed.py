@@ -150,7 +150,8 @@ MISTAKES = (
         building(lambda world: world.add("cube", Cube(0.02)) and None),
         (
             "body 'cube': Cube(spawn=None, start=None, kind='dyn..._size=0.02, color=(1.0, 0.0, "
-            "0.0, 1.0)) is no shape; shapes are Box, Sphere, Cylinder, Capsule, Mesh and Plane"
+            "0.0, 1.0)) is no shape; shapes are Box, Sphere, Cylinder, Capsule, ConvexHull, Mesh"
+            " and Plane"
         ),
     ),
     Mistake(

@@ -12,6 +12,7 @@ from robot_layouts.__main__ import main
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts.obstacles import _obstacle
+from robot_layouts.simulation.rendering import vulkan_problem
 from robots import DescriptorError, TaskError, UnknownNameError
 from tasks import (
     Area,
@@ -19,6 +20,7 @@ from tasks import (
     MultiRobotTask,
     Object,
     Randomization,
+    Texture,
     World,
     add_object,
     register_task,
@@ -151,6 +153,19 @@ def test_its_size_can_vary_and_it_stands_where_it_did():
     for _ in range(10):
         env.step(np.zeros((1, 8)))
     assert np.abs(env.state.pose("mug") - start).max() < 1e-3
+
+
+def test_a_pattern_covers_it_in_pictures(renderer):
+    if problem := vulkan_problem():
+        pytest.skip(problem)
+    checker = Texture(kinds=("checker",), cells=Fixed(4))
+    pictures: list[np.ndarray] = []
+    for varied in (None, Randomization(textures={"pot": checker})):
+        env = tasks.make(ID, render_mode="rgb_array", randomization=varied)
+        env.reset(seed=0)
+        pictures.append(env.render()[0].astype(float))
+    changed = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 20
+    assert 0.01 < changed.mean() < 0.3
 
 
 def test_another_member_of_a_family_in_each_episode():
