@@ -14,6 +14,7 @@ import platform
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from hashlib import sha256
@@ -34,10 +35,12 @@ from benchmarks.records import (
     write_record,
 )
 from robot_layouts.core.portable import FIXED, GLIBC, NUMPY, portable_variables
+from robot_layouts.data.playing.picture_digests import picture_digest, pictures_of
 from robot_layouts.experts import find_expert
+from robot_layouts.simulation import Camera
 from robots import DescriptorError, SimulationError, TaskError
 from robots.portable import numpy_versions
-from tasks import TaskEnv, list_tasks, make
+from tasks import TaskEnv, get_task_class, list_tasks, make
 from tasks.episode import REBUILT
 from tasks.randomization.distributions import Stream
 
@@ -52,10 +55,19 @@ CONTROLS = {
 }
 KINDS = ("actions", "states", "observations", "rewards")
 REACH = 0.6  # m, rad; where an action number has no bound
+PICTURES = "pictures"  # random actions, under the eyes of cameras
+TEXTURES = "rgb+depth+segmentation"
+CAMERAS = (
+    Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)),
+    Camera((0.0, 0.0, 1.2), (0.0, 0.01, 0.0), "top", 96, 96),
+    Camera((0.6, 0.7, 0.6), (0.0, 0.0, 0.35), "side", 224, 160, 1.0),
+)
 ABSENT = -1  # an episode of another length
 PLAIN, PORTABLE = "as it is", "portable"
 EMULATOR = "qemu-x86_64-static"
 LATEST = ("X86_V4", "AVX512_ICL", "AVX512_SPR", "AVX512F", "AVX512_SKX")
+
+SWIFTSHADER = "/usr/lib/chromium/vk_swiftshader_icd.json"
 
 Digests = dict[str, list[str]]
 
@@ -66,7 +78,7 @@ class Played(NamedTuple):
     Attributes:
         task: Id of the task.
         seed: Of its reset, and of its actions.
-        control: `EXPERT`, or the control mode in which actions are random.
+        control: `EXPERT`, or the control mode in which actions are random, or `PICTURES`.
         steps: How many, if they are random.
     """
 
@@ -123,11 +135,32 @@ def settings() -> dict[str, Setting]:
     }
 
 
+DRAWN = tuple(Played(task, 1, PICTURES, 8) for task in ("PickCube-v1", "TwoRobotPickCube-v1"))
+
+
+def drawings() -> dict[str, Setting]:
+    """Return how pictures are drawn, by name; the first is what the others are compared with."""
+    caps, width, threads = "GALLIUM_OVERRIDE_CPU_CAPS", "LP_NATIVE_VECTOR_WIDTH", "LP_NUM_THREADS"
+    return {
+        PLAIN: Setting("Mesa chooses by the processor", {}),
+        "once more": Setting("another process", {}),
+        **{
+            name: Setting(f"`{threads}={n}`", {threads: str(n)})
+            for n, name in enumerate(("no threads", "one thread", "two threads"))
+        },
+        **{f"{n} bits": Setting(f"`{width}={n}`", {width: str(n)}) for n in (128, 256, 512)},
+        "AVX": Setting(f"without AVX2, FMA and AVX-512: `{caps}=avx`", {caps: "avx"}),
+        "SSE": Setting(f"without AVX, too: `{caps}=sse4.1`", {caps: "sse4.1"}),
+        "SwiftShader": Setting("another software driver", {"VK_DRIVER_FILES": SWIFTSHADER}),
+    }
+
+
 def processors(
     *,
     tasks: tuple[str, ...] = (),
     seeds: int = 1,
     settings: tuple[str, ...] = (),
+    pictures: bool = False,
     out: Path = DOCS / "processors.json",
     render: bool = False,
 ) -> int:
@@ -137,6 +170,7 @@ def processors(
         tasks: Task ids (all).
         seeds: Of each expert and control mode.
         settings: Under which settings to play, by the names in the page (all without QEMU).
+        pictures: Play nothing; draw pictures in several ways.
         out: The record, which keeps other settings that were measured before; the page is beside.
         render: Play nothing; write the page of the record anew.
 
@@ -144,7 +178,11 @@ def processors(
         RobotLayoutsError: If something cannot be played, read or written.
     """
     record = read_record(out, processor="", versions={}, settings={}, portable={})
-    if not render:
+    record.setdefault("pictures", {})
+    if pictures and not render:
+        record["pictures"] = _drawn()
+        write_record(out, record)
+    elif not render:
         libraries = {**versions_of(*PACKAGES), "glibc": platform.libc_ver()[1]}
         record |= {"processor": _processor(), "versions": record["versions"] | libraries}
         episodes = [
@@ -161,6 +199,45 @@ def processors(
     }
     write_page(out, "processors", record=record, kinds=KINDS, counts=counts)
     return 0
+
+
+def _drawn() -> Record:
+    """Draw pictures in several ways, and return which of them differ."""
+    found: dict[str, list[Digests | None] | None] = {}
+    for name, one in tqdm(drawings().items(), disable=None):
+        try:
+            found[name] = play_under(one, DRAWN)
+        except SimulationError:  # the driver ends the process
+            found[name] = None
+    plain = _by_picture(found[PLAIN])
+    ways = {
+        name: {
+            "about": one.about,
+            "images": len(images := _by_picture(found[name])),
+            "different": Counter(
+                name.rpartition("/")[2]
+                for (name, moment), digest in images.items()
+                if plain[name, moment] != digest
+            ),
+        }
+        for name, one in drawings().items()
+    }
+    return {"processor": _processor(), "driver": _driver(), "ways": ways}
+
+
+def _by_picture(found: Sequence[Digests | None] | None) -> dict[tuple[str, int], str]:
+    return {
+        (f"{i}/{name}", moment): digest
+        for i, digests in enumerate(found or ())
+        for name, every in (digests or {}).items()
+        for moment, digest in enumerate(every)
+    }
+
+
+def _driver() -> str:
+    """Return what draws, and its version."""
+    with closing(make("PickCube-v1", obs_mode="rgb")) as task:
+        return task.simulation.describe_graphics()["driver"]
 
 
 def _measured(record: Record, episodes: Sequence[Played], names: Sequence[str]) -> Iterator[None]:
@@ -251,6 +328,8 @@ def physics(episodes: Sequence[Played], found: Sequence[Digests | None]) -> dict
 
 def digests(played: Played) -> Digests | None:
     """Return the digests of an episode, one per moment; None if its robots lack the mode."""
+    if played.control == PICTURES:
+        return _picture_digests(played)
     mode = None if played.control == EXPERT else played.control
     try:
         task = make(played.task, control_mode=mode)
@@ -270,6 +349,20 @@ def digests(played: Played) -> Digests | None:
             observation, reward, _, _, _ = task.step(action[None])
             note(actions=action, states=task.get_state_dict())
             note(observations=observation, rewards=reward)
+    return found
+
+
+def _picture_digests(played: Played) -> Digests:
+    """Return the digests of an episode's pictures by camera and texture, one per moment."""
+    robots = dict.fromkeys(get_task_class(played.task).layout, "panda_wristcam")
+    found: Digests = {}
+    with closing(make(played.task, robots=robots, obs_mode=TEXTURES, cameras=CAMERAS)) as task:
+        observation, _ = task.reset(played.seed, REBUILT)
+        for action in [*_actions(task, played), None]:
+            for name, picture in pictures_of(observation).items():
+                found.setdefault(name, []).append(picture_digest(picture[0].numpy()).hex()[:12])
+            if action is not None:
+                observation, *_ = task.step(action[None])
     return found
 
 

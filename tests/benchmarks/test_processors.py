@@ -14,11 +14,14 @@ from benchmarks.processors import (
     EMULATOR,
     EXPERT,
     PACKAGES,
+    PICTURES,
     PLAIN,
     PORTABLE,
     Played,
     Setting,
+    _driver,
     differences,
+    drawings,
     physics,
     play_under,
     settings,
@@ -67,3 +70,26 @@ def test_an_emulated_processor_computes_the_same():
 def test_a_process_that_ends_too_early_is_reported():
     with pytest.raises(SimulationError, match="after 0 of 1 episodes"):
         play_under(Setting("", {}), [Played("PickCubr-v1", 0, EXPERT, 0)])
+
+
+@pytest.mark.long
+def test_pictures_are_the_same_with_vectors_of_512_bits(renderer):
+    """And others without AVX, so that the comparison sees something."""
+    if "llvmpipe" not in _driver():
+        pytest.skip("these variables are of Mesa's software driver alone")
+    few = [Played("PickCube-v1", 1, PICTURES, 1)]
+    plain, wide, narrow = (play_under(drawings()[name], few) for name in (PLAIN, "512 bits", "SSE"))
+    assert len(plain[0]) == 12  # four cameras, three textures
+    assert wide == plain
+    assert narrow != plain
+
+
+def test_the_page_says_which_pictures_differ():
+    ways = json.loads(RECORD.read_text())["pictures"]["ways"]
+    assert list(ways) == list(drawings())
+    same = [name for name, way in ways.items() if way["images"] and not way["different"]]
+    assert same == [PLAIN, "once more", "no threads", "one thread", "two threads", *WIDE, "AVX"]
+    assert not ways["128 bits"]["images"]
+
+
+WIDE = ("256 bits", "512 bits")
