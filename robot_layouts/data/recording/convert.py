@@ -116,10 +116,10 @@ def convert(
     file: Recording,
     mode: str | Mapping[str, str],
     folder: Path,
-    executor: Executor | None = None,
-    *,
     count: int | None = None,
     cell: Mapping[str, Any] | None = None,
+    *,
+    executor: Executor | None = None,
     on_event: Callable[[Conversion, Event | None], None] = lambda found, event: None,
 ) -> Conversion:
     """Record the successful episodes of a recording in another control mode.
@@ -132,9 +132,9 @@ def convert(
         mode: The other mode, or one by arm.
         folder: Where ``trajectory.h5`` and ``trajectory.json`` are written; episodes that are
             there already are kept.
-        executor: Who plays; None: this process.
         count: How many of the first episodes; None: all.
         cell: Where robots stood and which, where the file cannot say it; see `task_for`.
+        executor: Who plays; None: this process.
         on_event: Called once at the start without an event, and after every event.
 
     Raises:
@@ -239,9 +239,9 @@ def convert_command(
                 file,
                 to,
                 out,
-                executor,
-                count=count,
-                cell=recording.cell.making(),
+                count,
+                recording.cell.making(),
+                executor=executor,
                 on_event=show,
             )
     print(printable(str(summary)))
