@@ -46,11 +46,14 @@ UPWARD = -0.2  # cosine: a gripper that picks points down more than that
 STRIDE = 0.4  # rad between postures on a way that are checked
 CLOSING, STEP = 60.0, 4e-4  # N with which fingers close on the cube, at least; m per step, at least
 FORCE, LEAST_FORCE = 15.0, 1.5  # N with which they hold a cube for Pandas; any cube, at least
-YIELD = 1e-4  # m that quick fingers are driven into what they hold, at least
+YIELD = 6e-5  # m that quick fingers are driven into what they hold, at least
 CROSSWISE = 0.5  # cosine between the ways in which two hands open that hold different faces
 ALIGNED = 4.0  # rad of way that a hand is worth which is turned as the cube is, by 1 rad
 SIMILAR = 0.5  # cosine between the approach that was planned and that which is taken
 APART = 0.4  # cosine between the approaches of two hands at most
+
+# How the cube comes to the goal, and how near (rad); it moves a little in the hand on the way.
+CARRIES = (("carry", 0.1), ("correct", 0.02), ("place", 0.02))
 
 PICKS, MEETINGS, TAKES, SCRIPTS = 3, 16, 600, 4  # how many of each go on, for each depth
 
@@ -421,7 +424,10 @@ class _Search:
                     until=cube_taken,
                     most=20,
                 ),
-                Waypoint("carry", joints=self._carry, squeeze=self._force(self._taker), near=0.1),
+                *(
+                    Waypoint(name, joints=self._carry, squeeze=self._force(self._taker), near=near)
+                    for name, near in CARRIES
+                ),
             ),
         }
 
