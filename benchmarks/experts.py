@@ -117,7 +117,7 @@ CELLS = {
 TASKS = (*CELLS, "Relay-v1")
 
 HAND_OVER = "TwoRobotHandOver-v1"
-HANDS = ("panda", "so100", "so101", "koch", "z1", "fetch")
+HANDS = ("panda", "so100", "so101", "z1", "fetch")
 PAIRS = tuple(dict.fromkeys(pair for hand in HANDS for pair in ((hand, hand), ("panda", hand))))
 
 

@@ -53,7 +53,7 @@ SIMILAR = 0.5  # cosine between the approach that was planned and that which is 
 APART = 0.4  # cosine between the approaches of two hands at most
 
 # How the cube comes to the goal, and how near (rad); it moves a little in the hand on the way.
-CARRIES = (("carry", 0.1), ("correct", 0.02), ("place", 0.02))
+CARRIES = (("carry", 0.1), ("correct", 0.02))
 
 PICKS, MEETINGS, TAKES, SCRIPTS = 3, 16, 600, 4  # how many of each go on, for each depth
 
@@ -428,18 +428,26 @@ class _Search:
                     Waypoint(name, joints=self._carry, squeeze=self._force(self._taker), near=near)
                     for name, near in CARRIES
                 ),
+                # Of arms whose quick fingers press hard the joints' speeds do not come to 0.
+                Waypoint("place", joints=self._carry, squeeze=self._gentle()),
             ),
         }
 
     def _force(self, hand: Hand) -> float:
-        """Return the force with which a hand holds the cube (N).
+        """Return the force with which a hand holds the cube while it moves (N).
 
-        It is in proportion to its weight: a light cube that is pressed harder slips out. Of what
-        quick drives press with, little is left once they have settled.
+        Of what quick drives press with, little is left once they have settled.
         """
-        force = max(FORCE * self._fit.scale**3, LEAST_FORCE)
         share = hand.motion.share(self._edge)
-        return max(force, hand.motion.force(YIELD, share)) if hand.quick else force
+        gentle = self._gentle()
+        return max(gentle, hand.motion.force(YIELD, share)) if hand.quick else gentle
+
+    def _gentle(self) -> float:
+        """Return the force with which the cube is held at rest (N).
+
+        It is in proportion to its weight: a light cube that is pressed harder slips out.
+        """
+        return max(FORCE * self._fit.scale**3, LEAST_FORCE)
 
     def _near(self, hand: Hand) -> float:
         """Return how near a hand has to come to its place at the cube (rad)."""
