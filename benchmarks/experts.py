@@ -196,6 +196,7 @@ def _handed_over(pairs: Record, seeds: int) -> Iterator[None]:
             task = make(HAND_OVER, layout=layout, obs_mode="none")
         except RobotLayoutsError as error:
             seen["error"] = str(error).partition("\n")[0].rstrip(":")
+            yield
         else:
             yield from _play(task, seen["episodes"], seeds)
 
