@@ -88,7 +88,9 @@ def test_what_is_equal_and_on_what_it_was_drawn(receipt):
     assert any("visual" in file for file in files)
 
 
-@pytest.mark.parametrize("who", [{"num_envs": 2}, {"workers": 2}], ids=str)
+@pytest.mark.parametrize(
+    "who", [{"num_envs": 2}, pytest.param({"workers": 2}, marks=pytest.mark.long)], ids=str
+)
 def test_who_plays_makes_no_difference(receipt, tmp_path, who):
     other = Receipt.read(seen(tmp_path, policy="tests.data.test_picture_receipts:looks", **who))
     assert other.episodes == Receipt.read(receipt).episodes
@@ -106,6 +108,7 @@ def test_pictures_of_each_so_many_th_step(receipt, tmp_path):
     assert rare.hash != every.hash
 
 
+@pytest.mark.long
 def test_an_expert_whose_plan_was_rehearsed(tmp_path):
     path = seen(tmp_path, policy="expert", seeds=[0], max_episode_steps=None)
     recorded = Receipt.read(path)

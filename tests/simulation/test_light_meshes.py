@@ -57,6 +57,7 @@ def farthest(points_of, surface) -> float:
     return float(trimesh.proximity.closest_point(surface, points)[1].max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("link", ["panda_link1", "panda_hand"])
 def test_no_point_is_1_mm_away(made_here, link):
     from sapien.render import RenderShapeTriangleMesh
@@ -75,6 +76,7 @@ def test_no_point_is_1_mm_away(made_here, link):
             assert getattr(part.material(), name) == getattr(own.material, name)
 
 
+@pytest.mark.long
 def test_it_is_smooth_and_faces_outwards(made_here, tmp_path):
     """Also if it is mirrored and stretched."""
     path = bumpy(tmp_path)
@@ -88,6 +90,7 @@ def test_it_is_smooth_and_faces_outwards(made_here, tmp_path):
         assert ((mesh.vertex_normals * outwards).sum(1) > 0.8).all()
 
 
+@pytest.mark.long
 def test_a_hole_is_not_closed_nor_a_small_piece_lost(made_here, tmp_path):
     tube = trimesh.creation.annulus(0.004, 0.006, 0.1, sections=400)
     speck = trimesh.creation.icosphere(4, 0.002)
@@ -114,6 +117,7 @@ def test_few_triangles_and_textures_stay(made_here, tmp_path):
     assert light_meshes.light_parts(str(tmp_path / "ball.glb"), (1.0, 1.0, 1.0)) == ()
 
 
+@pytest.mark.long
 def test_it_is_made_once_and_again_if_the_file_changes(made_here, tmp_path, monkeypatch):
     path = bumpy(tmp_path)
     first = light_meshes.light_parts(str(path), (1.0, 1.0, 1.0))
@@ -142,6 +146,7 @@ def pictures(renderer):
     return found
 
 
+@pytest.mark.long
 def test_pictures_are_nearly_the_same(pictures):
     (full, _, _), (light, _, _) = pictures["full"], pictures["light"]
     segments = (full["segmentation"] != light["segmentation"]).float().mean()
@@ -150,6 +155,7 @@ def test_pictures_are_nearly_the_same(pictures):
     assert (shades > 30).float().mean() < 0.02
 
 
+@pytest.mark.long
 def test_states_are_the_same(pictures):
     (_, full, _), (_, light, _) = pictures["full"], pictures["light"]
     for kind, entries in full.items():
@@ -157,6 +163,7 @@ def test_states_are_the_same(pictures):
             assert torch.equal(rows, light[kind][name])
 
 
+@pytest.mark.long
 def test_far_fewer_triangles_are_drawn(pictures):
     from robot_layouts.simulation.sapien3.backend import worlds_below
 

@@ -84,7 +84,14 @@ def our_differences(look: Look, task_id: str, obs_mode: str, **making: Any) -> l
     return found if same else [*found, "picture"]
 
 
-@pytest.mark.parametrize("what", [name for name in SETTINGS if "rays" not in name])
+@pytest.mark.parametrize(
+    "what",
+    [
+        pytest.param(name, marks=pytest.mark.long) if "for all" in name else name
+        for name in SETTINGS
+        if "rays" not in name
+    ],
+)
 def test_settings_by_name_are_native_s(what: str):
     sensors = unit(SETTINGS[what])
     look = native_look("PickCube-v1", EVERYTHING, "panda_wristcam", sensors=copy.deepcopy(sensors))
