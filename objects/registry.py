@@ -109,13 +109,7 @@ class ObjectRegistry:
         Raises:
             DescriptorError: If it is neither, or another one has that name.
         """
-        name = checked_object(thing, "register").name
-        if name in OBJECTS and OBJECTS[name] != thing:
-            raise DescriptorError(
-                f"another object is already called {name!r};"
-                " choose another name with dataclasses.replace(descriptor, name=...)"
-            )
-        OBJECTS.register(name, thing)
+        OBJECTS.add(checked_object(thing, "register").name, thing)
         return thing
 
 

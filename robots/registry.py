@@ -122,11 +122,5 @@ class RobotRegistry:
         Raises:
             DescriptorError: If it is no descriptor, or another robot has that name.
         """
-        name = checked_robot(descriptor, "register").name
-        if name in ROBOTS and ROBOTS[name] != descriptor:
-            raise DescriptorError(
-                f"another robot is already called {name!r};"
-                " choose another name with dataclasses.replace(descriptor, name=...)"
-            )
-        ROBOTS.register(name, descriptor)
+        ROBOTS.add(checked_robot(descriptor, "register").name, descriptor)
         return descriptor

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
+from objects.descriptor import Grasp
 from objects.families.making import (
     DOWN,
     FLAT,
@@ -111,17 +112,7 @@ def shaft(radius: float, length: float) -> Made:
             block((2 * half, 2 * half, base), (0.0, 0.0, base / 2), GREY_PLASTIC),
             disc(radius, base, base + length, STEEL),
         ],
-        [
-            *grips(
-                (0.0, 0.0, base + 0.6 * length),
-                UP,
-                (1.0, 0.0, 0.0),
-                2 * radius,
-                "shaft",
-                tilts=around(8),
-            ),
-            *from_above(base + length - 0.012, 2 * radius, "tip", around(4, 0.0, pi)),
-        ],
+        _rod_grips(radius, base, length, "shaft"),
         {"tip": point(0.0, 0.0, base + length), "seat": point(0.0, 0.0, base)},
     )
 
@@ -169,17 +160,7 @@ def bolt(radius: float, length: float) -> Made:
             prism(polygon(head, 6), 0.0, thick, STEEL),
             disc(radius, thick, thick + length, STEEL),
         ],
-        [
-            *grips(
-                (0.0, 0.0, thick + 0.6 * length),
-                UP,
-                (1.0, 0.0, 0.0),
-                2 * radius,
-                "shank",
-                tilts=around(8),
-            ),
-            *from_above(thick + length - 0.012, 2 * radius, "tip", around(4, 0.0, pi)),
-        ],
+        _rod_grips(radius, thick, length, "shank"),
         {"tip": point(0.0, 0.0, thick + length), "head": point(0.0, 0.0, 0.0, DOWN)},
     )
 
@@ -316,3 +297,12 @@ def _drilled(length: float, width: float, thick: float, hole: float, *, flat: bo
             size, middle = (thick, wide, high - low), (thick / 2, y, (low + high) / 2)
         found.append(block(size, middle, STEEL))
     return found
+
+
+def _rod_grips(radius: float, low: float, length: float, part: str) -> list[Grasp]:
+    """Return grasps of an upright rod that begins at a height: all round, and of its tip."""
+    middle, top = (0.0, 0.0, low + 0.6 * length), low + length - 0.012
+    return [
+        *grips(middle, UP, (1.0, 0.0, 0.0), 2 * radius, part, tilts=around(8)),
+        *from_above(top, 2 * radius, "tip", around(4, 0.0, pi)),
+    ]

@@ -90,6 +90,19 @@ class Catalogue(Mapping[str, Value]):
         self.registered[name] = value
         self.aliases.update({self._key(alias): name for alias in aliases})
 
+    def add(self, name: str, value: Value) -> None:
+        """Make a descriptor known in this process; the same one again is allowed.
+
+        Raises:
+            RobotLayoutsError: The catalogue's own error, if another one has that name.
+        """
+        if name in self and self[name] != value:
+            raise self._error(
+                f"another {self.kind} is already called {name!r};"
+                " choose another name with dataclasses.replace(descriptor, name=...)"
+            )
+        self.register(name, value)
+
     def aliases_of(self, name: str) -> tuple[str, ...]:
         """Return the other names of what goes by a name."""
         return tuple(alias for alias, target in self.aliases.items() if target == name)

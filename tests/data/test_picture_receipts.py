@@ -1,10 +1,12 @@
 """Receipts of policies that see: a digest of every picture, and where the first other one is."""
 
+import io
 import json
 from base64 import b64decode, b64encode
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -13,8 +15,9 @@ import torch
 import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate
+from robot_layouts.data.playing.picture_digests import PictureTrace
 from robot_layouts.data.receipts import Receipt, ReceiptError
-from robot_layouts.data.receipts.pictures import pictures_folder
+from robot_layouts.data.receipts.pictures import kept, pictures_folder
 from robot_layouts.data.receipts.provenance import describe_making
 from robot_layouts.simulation.sapien3 import studio
 from robots import TaskError
@@ -178,6 +181,15 @@ def test_kept_pictures_that_cannot_be_read_are_not_shown(tmp_path, monkeypatch):
     found = again(path, policy=plan)
     shown = found.write_pictures(tmp_path / "out", pictures_folder(path))
     assert [_read(one).shape for one in shown] == [(16, 24, 3)] * 2
+
+
+def test_a_kept_file_that_claims_more_than_it_holds_is_not_shown(tmp_path):
+    header = io.BytesIO()
+    claim = {"descr": "|u1", "fortran_order": False, "shape": (10**7, 10**7)}
+    np.lib.format.write_array_header_1_0(header, claim)
+    with ZipFile(tmp_path / "seed_0.npz", "w") as file:
+        file.writestr("camera/rgb.npy", header.getvalue())
+    assert kept(tmp_path, 0, "camera/rgb", PictureTrace("", "")) is None
 
 
 def test_points_have_digests_too(tmp_path):

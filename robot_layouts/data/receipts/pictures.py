@@ -93,10 +93,23 @@ def kept(folder: Path, seed: int, name: str, recorded: PictureTrace) -> Image | 
             member = f"{name}.npy"
             if file.getinfo(member).file_size > _LARGEST:
                 return None
-            rows = np.lib.format.read_array(io.BytesIO(file.read(member)), allow_pickle=False)
-    except (OSError, BadZipFile, zlib.error, KeyError, ValueError):
+            rows = _array(file.read(member))
+    except (OSError, EOFError, BadZipFile, zlib.error, KeyError, ValueError, RuntimeError):
         return None
     return rows if trace_of_pictures(map(picture_digest, rows)) == recorded else None
+
+
+def _array(content: bytes) -> NDArray[Any]:
+    """Return the array of an npy file, which is no larger than the file, whatever that claims.
+
+    Raises:
+        ValueError: If it is not one of numbers.
+    """
+    file = io.BytesIO(content)
+    if np.lib.format.read_magic(file) != (1, 0):
+        raise ValueError("not what `keep` writes")
+    shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+    return np.frombuffer(content, dtype, offset=file.tell()).reshape(shape)
 
 
 def _file(folder: Path, seed: int) -> Path:

@@ -80,7 +80,7 @@ def light_parts(path: str, scale: Sequence[float]) -> tuple[LightPart, ...]:
         scale: Its factors along x, y and z.
 
     Returns:
-        None if the file is to be drawn as it is: it has textures, or few triangles.
+        Empty if the file is to be drawn as it is: it has textures, or few triangles.
 
     Raises:
         MissingPackageError: If a package is missing, and they were not made before.
