@@ -12,11 +12,13 @@ expect_own("robots")
 
 from objects.descriptor import Grasp, NamedPoint, ObjectDescriptor
 from objects.family import Family, Made, Size, family
+from objects.joints import Joint
 from objects.registry import ObjectRegistry
 
 __all__ = [
     "Family",
     "Grasp",
+    "Joint",
     "Made",
     "NamedPoint",
     "ObjectDescriptor",

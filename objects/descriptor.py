@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated
 
+from objects.joints import Joint, checked_joints
 from objects.shapes import SIZED, Coordinate, Length, Place, Shape, scaled
 from robot_layouts.core.bounds import checked_number, expect_unit
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
@@ -45,7 +46,8 @@ class Grasp:
         position: Of the tool centre point in the thing's frame (m).
         quaternion: Of the gripper's frame in the thing's, wxyz.
         opening: How far apart the fingers are when they hold it (m).
-        part: What is held, such as ``"handle"``.
+        part: What is held, such as ``"handle"``. If it is the name of a joint, the grasp moves with
+            the part of that joint.
     """
 
     position: tuple[Coordinate, Coordinate, Coordinate]
@@ -63,12 +65,14 @@ class Grasp:
 class ObjectDescriptor:
     """Everything the library knows about one thing; frozen, and checked when made.
 
-    Variants are made with `dataclasses.replace` and `scaled`. It is one rigid body.
+    Variants are made with `dataclasses.replace` and `scaled`. It is one rigid body, and the parts
+    that its joints move.
 
     Attributes:
         name: Registry name.
         about: What it is, in a few words.
         parts: Its shapes in its own frame; those that collide weigh what their densities say.
+        joints: What slides or turns against these, each after the one that carries it.
         rests: How it lies on a table: orientation, wxyz, by name; the first is the usual one.
         source: Where its numbers come from.
         points: Points of it that tasks speak of, by name.
@@ -81,6 +85,7 @@ class ObjectDescriptor:
     name: str
     about: str
     parts: tuple[Shape, ...]
+    joints: tuple[Joint, ...] = ()
     rests: Mapping[str, Quaternion] = field(default_factory=lambda: {"upright": IDENTITY})
     source: str
     points: Mapping[str, NamedPoint] = field(default_factory=dict[str, NamedPoint])
@@ -101,7 +106,8 @@ class ObjectDescriptor:
             raise DescriptorError(
                 f"{self.name}: no part collides; one at least must, so that it has a mass"
             )
-        for part in self.parts:
+        checked_joints(self.name, self.joints)
+        for part in self.all_parts:
             if not isinstance(part, SIZED):
                 raise DescriptorError(
                     f"{self.name}: parts holds a {type(part).__name__}, which has no size; parts"
@@ -115,18 +121,23 @@ class ObjectDescriptor:
             object.__setattr__(self, name, _FrozenMapping(getattr(self, name)))
 
     @property
+    def all_parts(self) -> tuple[Shape, ...]:
+        """Its shapes, those that its joints move included, as they are with all joints at zero."""
+        return (*self.parts, *(part for joint in self.joints for part in joint.parts))
+
+    @property
     def mass(self) -> float:
         """What it weighs (kg)."""
         from objects.solids import mass_of
 
-        return mass_of(self.parts).mass
+        return mass_of(self.all_parts).mass
 
     @property
     def centre_of_mass(self) -> Place:
         """Its centre of mass, in its own frame (m)."""
         from objects.solids import mass_of
 
-        x, y, z = mass_of(self.parts).centre.tolist()
+        x, y, z = mass_of(self.all_parts).centre.tolist()
         return x, y, z
 
     @property
@@ -134,7 +145,7 @@ class ObjectDescriptor:
         """Its lengths along the axes of its own frame (m)."""
         from objects.solids import bounds
 
-        low, high = bounds(self.parts)
+        low, high = bounds(self.all_parts)
         x, y, z = (high - low).tolist()
         return x, y, z
 
@@ -164,7 +175,7 @@ class ObjectDescriptor:
         """
         from objects.solids import lowest
 
-        return round(-lowest(self.parts, self.rest(rest)), 9) + 0.0
+        return round(-lowest(self.all_parts, self.rest(rest)), 9) + 0.0
 
     def point(self, name: str) -> NamedPoint:
         """Return one of its points.
@@ -175,6 +186,17 @@ class ObjectDescriptor:
         if name not in self.points:
             raise UnknownNameError(f"point of {self.name}", name, self.points)
         return self.points[name]
+
+    def joint(self, name: str) -> Joint:
+        """Return one of its joints.
+
+        Raises:
+            UnknownNameError: If it has no such joint.
+        """
+        joints = {joint.name: joint for joint in self.joints}
+        if name not in joints:
+            raise UnknownNameError(f"joint of {self.name}", name, joints)
+        return joints[name]
 
     def grasps_for(self, opening: float, clearance: float = 0.006) -> tuple[Grasp, ...]:
         """Return the grasps that a gripper opens wide enough for.
@@ -195,6 +217,7 @@ class ObjectDescriptor:
         return replace(
             self,
             parts=tuple(scaled(part, times) for part in self.parts),
+            joints=tuple(joint.scaled(times) for joint in self.joints),
             points={
                 name: replace(point, position=_times(point.position, times))
                 for name, point in self.points.items()
@@ -213,7 +236,8 @@ class ObjectDescriptor:
     def __repr__(self) -> str:
         """Show name and counts; the fields are many."""
         member = "" if self.seed is None else f", seed {self.seed}"
-        counts = f"{len(self.parts)} parts, {len(self.grasps)} grasps"
+        joints = f"{len(self.joints)} joints, " if self.joints else ""
+        counts = f"{len(self.parts)} parts, {joints}{len(self.grasps)} grasps"
         return f"ObjectDescriptor({self.name!r}{member}: {counts})"
 
 

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from objects.descriptor import Grasp, NamedPoint, ObjectDescriptor
+from objects.joints import Joint
 from objects.shapes import Shape
 from robot_layouts.core.bounds import checked_number, checked_whole
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
@@ -36,6 +37,7 @@ class Made(NamedTuple):
     grasps: Sequence[Grasp] = ()
     points: Mapping[str, NamedPoint] = MappingProxyType({})
     rests: Mapping[str, Quaternion] = MappingProxyType({"upright": IDENTITY})
+    joints: Sequence[Joint] = ()
 
 
 @dataclass(frozen=True)
@@ -106,12 +108,14 @@ class Family:
         if not isinstance(made, Made):
             raise DescriptorError(
                 f"the function of the family {self.name!r} gave {shown(made)}, of type"
-                f" {type(made).__name__}; it must return a Made(parts, grasps, points, rests)"
+                f" {type(made).__name__}; it must return a Made(parts, grasps, points, rests,"
+                " joints)"
             )
         return ObjectDescriptor(
             name=self.name,
             about=self.about,
             parts=tuple(made.parts),
+            joints=tuple(made.joints),
             rests=dict(made.rests),
             source=SOURCE,
             points=dict(made.points),

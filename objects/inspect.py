@@ -54,6 +54,12 @@ def report(thing: ObjectDescriptor) -> str:
         ),
         "grasps": _grasps(thing),
         "parts": _parts(thing),
+        "joints": _table(
+            [
+                (joint.name, f"{joint.kind}s", f"{joint.lower:g} to {joint.upper:g} {joint.unit}")
+                for joint in thing.joints
+            ]
+        ),
     }
     lines = [
         line for title, body in sections.items() for line in (title, *(f"  {row}" for row in body))
@@ -69,12 +75,12 @@ def _grasps(thing: ObjectDescriptor) -> Iterator[str]:
 
 
 def _parts(thing: ObjectDescriptor) -> Iterator[str]:
-    kinds = [type(part).__name__ for part in thing.parts if part.collides]
+    kinds = [type(part).__name__ for part in thing.all_parts if part.collides]
     yield ", ".join(f"{kinds.count(kind)} {kind}" for kind in sorted(set(kinds)))
-    for part in thing.parts:
+    for part in thing.all_parts:
         if isinstance(part, Mesh):
             yield f"mesh {part.file}"
-    materials = dict.fromkeys((part.density, part.friction) for part in thing.parts)
+    materials = dict.fromkeys((part.density, part.friction) for part in thing.all_parts)
     for density, friction in materials:
         rubs = "the world's friction" if friction is None else f"friction {friction.static:g}"
         yield f"{density:g} kg/m³, {rubs}"

@@ -144,7 +144,7 @@ def _faces(thing: ObjectDescriptor) -> tuple[Floats, NDArray[np.intp], Floats]:
     triangles: list[NDArray[np.intp]] = []
     paints: list[Floats] = []
     count = 0
-    for part in thing.parts:
+    for part in thing.all_parts:
         if not part.visible:
             continue
         found = surface(part)

@@ -11,6 +11,14 @@ from robot_layouts.core.quoting import shown
 # Families by the module that makes them; each is an attribute of the same name there.
 _FAMILIES = {
     "containers": ("box", "box_lid", "pallet", "rack", "tote", "tray"),
+    "controls": (
+        *("button", "crank", "dial", "gate", "latch", "lever", "rocker", "seesaw", "slider"),
+        *("tap", "toaster", "turntable", "valve"),
+    ),
+    "furniture": (
+        *("chest", "cupboard", "drawer", "hinged_box", "laptop", "screw_jar", "swing_bin"),
+        "window",
+    ),
     "joining": ("bolt", "bracket", "gear", "nut", "outlet", "peg", "plug", "shaft", "socket"),
     "stock": ("beam", "board", "brick", "hammer", "screwdriver", "spoon"),
     "vessels": (

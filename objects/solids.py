@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from itertools import combinations
 from math import pi
@@ -11,9 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from objects.joints import Joint
 from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Place, Shape, Sphere
 from robot_layouts.core.errors import DescriptorError
-from robot_layouts.kinematics.rotations import Floats, inverse, pose_matrix, rotate, transform
+from robot_layouts.kinematics.rotations import (
+    Floats,
+    inverse,
+    multiply,
+    pose_matrix,
+    rotate,
+    transform,
+)
 
 SIDES = 32  # of the polygon that stands for a circle where a surface is wanted
 _SAME_PLANE = 1e-7  # m; corners this near to a plane are in it
@@ -102,6 +110,31 @@ def bounds(shapes: Iterable[Shape]) -> tuple[Floats, Floats]:
     high = np.array([reach(parts, axis) for axis in np.eye(3)])
     low = -np.array([reach(parts, -axis) for axis in np.eye(3)])
     return low, high
+
+
+def part_poses(joints: Sequence[Joint], root: Floats, positions: Floats) -> Mapping[str, Floats]:
+    """Return where the parts of a thing are.
+
+    Args:
+        joints: The thing's joints.
+        root: Poses of the thing, (T, 7): position (m) and quaternion (wxyz).
+        positions: Of its joints, (T, joints).
+
+    Returns:
+        The pose of each part by name, (T, 7); that of the thing where all joints are at zero.
+    """
+    found = dict[str, Floats]()
+    for joint, position in zip(joints, np.asarray(positions, float).T, strict=True):
+        carrier = np.asarray(root if joint.carrier is None else found[joint.carrier], float)
+        axis, at = np.array(joint.axis), np.array(joint.at)
+        turn = np.zeros((len(position), 4))
+        turn[:, 0], way = 1.0, position[:, None] * axis
+        if joint.kind == "turn":
+            turn[:, 0], turn[:, 1:] = np.cos(position / 2), np.sin(position / 2)[:, None] * axis
+            way = at - rotate(turn, np.broadcast_to(at, way.shape))
+        place = carrier[:, :3] + rotate(carrier[:, 3:], way)
+        found[joint.name] = np.concatenate([place, multiply(carrier[:, 3:], turn)], axis=1)
+    return found
 
 
 def surface(shape: Shape) -> Triangles:

@@ -15,7 +15,7 @@ from objects.solids import hull_triangles
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
 from robots import TaskError
 from tasks.engine.env import TaskEnv
-from tasks.native.format import articulation_keys, declared_joints
+from tasks.native.format import articulation_keys, body_poses, declared_joints
 
 PLANE_SIZE = 6.0  # m, of what is drawn of an infinite plane
 ROOT = 13  # numbers of a row before the joints: the root's pose and velocities
@@ -71,9 +71,9 @@ def recorded_motion(task: TaskEnv, states: Mapping[str, Mapping[str, NDArray[Any
         own = declared_joints(task.simulation.index, name, rows[:, ROOT : ROOT + joints])
         qpos[name] = own.astype(float)
     poses = {
-        name: rows[:, :7].astype(float)
-        for name, rows in states.get("actors", {}).items()
-        if name in world.bodies and body_parts(world.bodies[name].shapes)
+        name: rows.astype(float)
+        for name, rows in body_poses(world, states).items()
+        if body_parts(world.bodies[name].shapes)
     }
     return ShownMotion(1 / task.scenario.control_frequency, qpos, poses)
 

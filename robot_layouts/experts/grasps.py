@@ -20,6 +20,7 @@ from robot_layouts.experts.geometry import (
 from robot_layouts.experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
 from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate
+from robot_layouts.simulation.world import part_name
 from robots import TaskError
 from tasks import TaskEnv
 
@@ -90,6 +91,8 @@ def thing_grips(
 ) -> Callable[[Scene], list[Pose]]:
     """Return the grips of a thing that a gripper can do, wherever the thing is.
 
+    Grasps of what its joints move go with that.
+
     Args:
         thing: Says where it is grasped.
         body: Its name in the world.
@@ -107,9 +110,12 @@ def thing_grips(
         )
     places = np.array([grasp.position for grasp in grasps])
     turns = np.array([grasp.quaternion for grasp in grasps])
+    moving = {joint.name for joint in thing.joints}
+    held = [part_name(body, g.part) if g.part in moving else body for g in grasps]
 
     def grips(scene: Scene) -> list[Pose]:
-        position, quaternion = scene.body(body)
+        poses = {name: scene.body(name) for name in held}
+        position, quaternion = (np.array(rows) for rows in zip(*map(poses.get, held), strict=True))
         points, frames = position + rotate(quaternion, places), multiply(quaternion, turns)
         steep = -rotate(frames, np.array([0.0, 0.0, 1.0]))[:, 2] >= np.cos(lean)
         return [*zip(points[steep], frames[steep], strict=True)]

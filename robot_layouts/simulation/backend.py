@@ -115,11 +115,13 @@ class Built:
         frames: Number of frames F.
         bodies: Frame of each body.
         robots: Robot by name, in layout order.
+        joints: Names of the joints of each body that has some.
     """
 
     frames: int
     bodies: Mapping[str, int]
     robots: Mapping[str, BuiltRobot]
+    joints: Mapping[str, tuple[str, ...]]
 
 
 class PoseSolver(Protocol):
@@ -226,7 +228,7 @@ class Backend(Protocol):
         ...
 
     def place(self, placements: Placements) -> None:
-        """Stand robots at their base pose and given joints, at rest, and move bodies."""
+        """Stand robots at their base pose and given joints, at rest, and move bodies and joints."""
         ...
 
     def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
@@ -253,6 +255,10 @@ class Backend(Protocol):
         """Return linear and angular velocity of each robot's root, (R, N, 6) (m/s, rad/s)."""
         ...
 
+    def body_joints(self, body: str) -> Floats:
+        """Return positions, then velocities of a body's joints, (N, 2 · joints) (m, rad, …/s)."""
+        ...
+
     def forces(self, pairs: tuple[Pair, ...]) -> Floats | None:
         """Return contact forces of the last step of physics, (P, N, 3); None if all are zero."""
         ...
@@ -263,6 +269,7 @@ class Backend(Protocol):
         Args:
             env_ids: Which worlds.
             bodies: Pose, linear and angular velocity, (K, 13); only dynamic ones take velocities.
+                Those with joints have the joints' positions and velocities as well.
             robots: The same of the root, then joint positions and velocities, (K, 13 + 2 · dof).
         """
         ...

@@ -100,6 +100,10 @@ class Moment:
         """Return velocities of the robots' roots, (R, N, 6); see `Backend`."""
         return self._present().root_velocities()
 
+    def body_joints(self, body: str) -> Floats:
+        """Return joints of a body, (N, 2 · joints); see `Backend`."""
+        return self._present().body_joints(body)
+
     def forces(self, pairs: tuple[Pair, ...]) -> Floats | None:
         """Return contact forces, (P, N, 3), or None; see `Backend`."""
         return self._present().forces(pairs)
@@ -127,6 +131,7 @@ class ReadoutIndex:
         frames: Number of frames.
         dof: Number of joints of all robots.
         bodies: Frame of each body.
+        body_joints: Place of each joint of the bodies that have some.
         links: Frame of each robot's links.
         tcps: Frame of each robot's tool centre point.
         joints: Places of each robot's joints, in layout order.
@@ -151,6 +156,10 @@ class ReadoutIndex:
         self.frames, self.dof = built.frames, 0
         self.bodies: Places[int] = Places("body of this world")
         self.bodies.update(built.bodies)
+        self.body_joints: Places[Places[int]] = Places("body with joints")
+        for body, joints in built.joints.items():
+            places = self.body_joints[body] = Places(f"joint of {body}")
+            places.update((joint, i) for i, joint in enumerate(joints))
         self.links: Places[Places[int]] = Places(_ROBOT)
         self.tcps: Places[int] = Places(_ROBOT)
         self.joints: Places[slice | list[int]] = Places(_ROBOT)

@@ -278,8 +278,7 @@ class Simulation:
         """Place what is to be placed, and let states that were read be past."""
         if self._placements:
             self.backend.place(self._placements)
-            self._placements.bodies.clear()
-            self._placements.robots.clear()
+            self._placements.clear()
         self._moment.past = True
         self._moment = Moment(self.backend)
         self._latest = None

@@ -216,6 +216,21 @@ class State:
         """Linear and angular velocity of each robot's root, (robots, N, 6) (m/s, rad/s)."""
         return self._moment.root_velocities()
 
+    @_remembered
+    def body_joints(self, body: str) -> Floats:
+        """Positions, then velocities of a body's joints, (N, 2 · joints) (m, rad, and per s)."""
+        self._index.body_joints.expect(body)
+        return self._moment.body_joints(body)
+
+    def joint(self, body: str, joint: str) -> Floats:
+        """Position of a joint of a body, shape (N,) (m or rad)."""
+        return self.body_joints(body)[:, self._index.body_joints[body][joint]]
+
+    def joint_velocity(self, body: str, joint: str) -> Floats:
+        """Velocity of a joint of a body, shape (N,) (m/s or rad/s)."""
+        joints = self._index.body_joints[body]
+        return self.body_joints(body)[:, len(joints) + joints[joint]]
+
     # -- robots ------------------------------------------------------------------------------
 
     def qpos(self, robot: str) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, Literal, get_args
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
+from objects.joints import Joint, checked_joints
 from objects.shapes import Shape, scaled
 from robot_layouts.core.bounds import checked_choice, expect_unit, shown
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
@@ -38,6 +39,8 @@ class WorldBody:
         marker: Whether it is there for people only: cameras that observe do not see it.
         scale: Factor by which ``shapes`` are larger than the task declared them; wherever the task
             puts it, its lowest point is where that of the declared body would be.
+        joints: What moves parts of it; each part is a body of the world, too, ``NAME.JOINT``.
+        part_of: The body whose joint moves it; None of those that are no such part.
     """
 
     name: str
@@ -48,6 +51,13 @@ class WorldBody:
     anchored: bool = False
     marker: bool = False
     scale: float = field(default=1.0, repr=False)
+    joints: tuple[Joint, ...] = ()
+    part_of: str | None = None
+
+
+def part_name(body: str, joint: str) -> str:
+    """Return the name of the body that a joint of another body moves."""
+    return f"{body}.{joint}"
 
 
 @dataclass
@@ -57,19 +67,26 @@ class Placements:
     Attributes:
         bodies: By name, then by world: position (m) and quaternion (wxyz), seven numbers.
         robots: Likewise: joint positions in the descriptor's order, (dof,) (rad, m).
+        joints: By body, then by world: positions of joints by name (m, rad).
     """
 
     bodies: dict[str, dict[int, list[float]]] = field(default_factory=dict)
     robots: dict[str, dict[int, NDArray[np.float64]]] = field(default_factory=dict)
+    joints: dict[str, dict[int, dict[str, float]]] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """Tell whether there is anything to place."""
-        return bool(self.bodies or self.robots)
+        return bool(self.bodies or self.robots or self.joints)
+
+    def clear(self) -> None:
+        """Forget all of it."""
+        for placed in (self.bodies, self.robots, self.joints):
+            placed.clear()
 
     def forget(self, env_ids: Iterable[int]) -> None:
         """Leave out what was meant for some worlds."""
         for env in env_ids:
-            for rows in (*self.bodies.values(), *self.robots.values()):
+            for rows in (*self.bodies.values(), *self.robots.values(), *self.joints.values()):
                 rows.pop(env, None)
 
 
@@ -135,8 +152,9 @@ class World:
         quaternion: Quaternion = IDENTITY,
         anchored: bool = False,
         marker: bool = False,
+        joints: Sequence[Joint] = (),
     ) -> WorldBody:
-        """Add a body made of shapes.
+        """Add a body made of shapes, and the parts that its joints move.
 
         Args:
             name: A name no other body of this world has.
@@ -146,19 +164,28 @@ class World:
             quaternion: How it is turned, wxyz.
             anchored: Whether every reset puts it back there.
             marker: Whether it is there for people only: cameras that observe do not see it.
+            joints: What moves parts of it, each after the one that carries it. A body that is not
+                dynamic is held in the world; its parts move all the same.
 
         Raises:
             SimulationError: If the name is taken, or something is not what it must be.
+            DescriptorError: If two joints have the same name.
+            UnknownNameError: If a joint is carried by none of those before it.
         """
         self._check_body(name, shapes, kind)
+        joints = checked_joints(f"body {name!r}", joints)
         if name in self.bodies:
             raise SimulationError(f"this world already has a body called {name!r}")
         self._pose(name, position, quaternion)
         scale = self.scales.get(name, 1.0)
         if scale != 1.0:
             shapes = tuple(scaled(shape, scale) for shape in shapes)
-        body = WorldBody(name, shapes, kind, position, quaternion, anchored, marker, scale)
+            joints = tuple(joint.scaled(scale) for joint in joints)
+        body = WorldBody(name, shapes, kind, position, quaternion, anchored, marker, scale, joints)
         self.bodies[name] = body
+        for joint in joints:
+            part = WorldBody(part_name(name, joint.name), joint.parts, marker=marker, part_of=name)
+            self.bodies[part.name] = part
         return body
 
     def body(self, name: str) -> WorldBody:
@@ -194,7 +221,31 @@ class World:
         pose = self._pose(", ".join(map(str, names)), position, quaternion)
         rows = self._placements.bodies
         for name in names:
-            rows.setdefault(self.body(name).name, {})[self._number] = pose
+            if (owner := self.body(name).part_of) is not None:
+                raise SimulationError(
+                    f"{name!r} is a part of {owner!r}, which a joint moves; place {owner!r}, or its"
+                    " joints by set_joints"
+                )
+            rows.setdefault(name, {})[self._number] = pose
+
+    def set_joints(self, name: str, **positions: float) -> None:
+        """Move joints of a body; those that are left out stay where they are.
+
+        Args:
+            name: The body.
+            **positions: By the joint's name (m, rad).
+
+        Raises:
+            UnknownNameError: If the world has no such body, or that no such joint.
+            DescriptorError: If a joint cannot be there.
+        """
+        joints = {joint.name: joint for joint in self.body(name).joints}
+        for joint, position in positions.items():
+            if joint not in joints:
+                raise UnknownNameError(f"joint of {name}", joint, joints)
+            joints[joint].check(position)
+        rows = self._placements.joints.setdefault(name, {})
+        rows.setdefault(self._number, {}).update(positions)
 
     def stand(self, robot: str, qpos: Any) -> None:
         """Stand a robot at its base pose, at rest.

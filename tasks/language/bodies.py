@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import cos, isfinite, sin
@@ -74,12 +74,7 @@ class Area:
         for name, value in (("x", self.x), ("y", self.y), ("z", self.z), ("yaw", self.yaw)):
             if value is None or value == "any":
                 continue
-            low, high = _bounds(name, value)
-            if not (isfinite(low) and isfinite(high) and low <= high):
-                raise TaskError(
-                    f"an area's {name} is {value!r}; it takes a finite number, or two of them, the"
-                    " smaller first"
-                )
+            _bounds(f"an area's {name}", value)
 
     def draw(self, rng: EpisodeRandom, height: float) -> tuple[list[float], Quaternion]:
         """Draw a pose: first what varies of x, y and z, at once, then the angle.
@@ -112,16 +107,21 @@ class Area:
         return (cos(self.yaw / 2), 0.0, 0.0, sin(self.yaw / 2)) if self.yaw else IDENTITY
 
 
-def _bounds(name: str, value: object) -> tuple[float, float]:
+def _bounds(what: str, value: object) -> tuple[float, float]:
     match value:
         case (int() | float() as low, int() | float() as high):
-            return float(low), float(high)
-        case int() | float() as both:
-            return float(both), float(both)
+            pass
+        case int() | float() as low:
+            high = low
         case _:
             raise TaskError(
-                f"an area's {name} is {value!r}; it takes a number, or the smallest and the largest"
+                f"{what} is {value!r}; it takes a number, or the smallest and the largest"
             )
+    if not (isfinite(low) and isfinite(high) and low <= high):
+        raise TaskError(
+            f"{what} is {value!r}; it takes a finite number, or two of them, the smaller first"
+        )
+    return float(low), float(high)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -354,17 +354,23 @@ class Compound(Body):
 class Object(Body):
     """A thing of `objects.ObjectRegistry`, lying as it rests.
 
+    The parts that its joints move are bodies of the world, too: the drawer of ``cabinet`` is
+    ``cabinet.drawer``. A ``kind`` that is not dynamic holds the rest of it where it stands.
+
     Attributes:
         thing: Its name there, or a descriptor.
         rest: Which of its ``rests`` it lies in; None for the first.
         seed: Draws a member of its family; None takes the usual one.
         scale: Factor on its lengths.
+        joints: Where episodes begin with its joints (m, rad), by name: a number, or the smallest
+            and the largest that may be drawn. Those that are left out begin at their own start.
     """
 
     thing: ObjectDescriptor | str
     rest: str | None = field(default=None, kw_only=True)
     seed: int | None = field(default=None, kw_only=True)
     scale: Factor = field(default=1.0, kw_only=True)
+    joints: Mapping[str, Any] = field(default_factory=dict[str, Any], kw_only=True)
     sizes: ClassVar[tuple[str, ...]] = ("scale",)
 
     def __post_init__(self) -> None:
@@ -372,11 +378,14 @@ class Object(Body):
 
         Raises:
             TaskError: If a value is of a wrong type or out of bounds.
-            UnknownNameError: If there is no such thing, or it does not rest so.
-            DescriptorError: If a seed is given, and it has no family.
+            UnknownNameError: If there is no such thing, it does not rest so, or has no such joint.
+            DescriptorError: If a seed is given, and it has no family; or a joint cannot be there.
         """
         super().__post_init__()
         self.descriptor.rest(self.rest)
+        for name, value in self.joints.items():
+            for end in _bounds(f"Object: joint {name}", value):
+                self.descriptor.joint(name).check(end)
 
     @property
     def descriptor(self) -> ObjectDescriptor:
@@ -401,7 +410,18 @@ class Object(Body):
     def add_to(self, world: World, name: str) -> None:
         """Build it in a world, turned as it rests."""
         place = (0.0, 0.0, self.height) if self.start is None else self.start
-        world.add(name, *self.shapes, kind=self.kind, position=place, quaternion=self.lying)
+        turn, joints = self.lying, self.descriptor.joints
+        world.add(
+            name, *self.shapes, kind=self.kind, position=place, quaternion=turn, joints=joints
+        )
+
+    def place(self, world: World, name: str, rng: EpisodeRandom) -> None:
+        """Put it where its area says, and its joints where they begin."""
+        super().place(world, name, rng)
+        if self.joints:
+            lows, highs = zip(*(_bounds(*each) for each in self.joints.items()), strict=True)
+            drawn = rng.uniform_between(lows, highs).tolist()
+            world.set_joints(name, **dict(zip(self.joints, drawn, strict=True)))
 
 
 @lru_cache(maxsize=256)

@@ -132,8 +132,8 @@ def add_object(
     found = ObjectRegistry.load(thing, seed) if isinstance(thing, str) else thing
     turned = found.rest() if quaternion is None else quaternion
     x, y, z = position
-    place = x, y, z - lowest(found.parts, turned)
-    world.add(name, *found.parts, kind=kind, position=place, quaternion=turned)
+    place, joints = (x, y, z - lowest(found.all_parts, turned)), found.joints
+    world.add(name, *found.parts, kind=kind, position=place, quaternion=turned, joints=joints)
     return found
 
 

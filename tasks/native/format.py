@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from layouts import Layout
+from objects.solids import part_poses
 from robot_layouts.core.bounds import FAR, expect_unit, shown
-from robot_layouts.simulation import Simulation, State
+from robot_layouts.simulation import Simulation, State, World
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.readout import ReadoutIndex
+from robot_layouts.simulation.world import WorldBody, part_name
 from robots import TaskError, unknown_name_message
 from tasks.arrays import array_of, leaves
 from tasks.native import controllers
@@ -101,8 +103,8 @@ def read_state_dict(simulation: Simulation, state: State) -> StateDict:
     """Return every pose and velocity as rows in native's format.
 
     Bodies that can move are rows of 13: position (m), quaternion (wxyz), linear (m/s) and angular
-    velocity (rad/s). Robots are the same of their root, then qpos and qvel. Where a control mode
-    has targets, they are there as ``controller``.
+    velocity (rad/s). Robots, and bodies with joints, are the same of their root, then qpos and
+    qvel. Where a control mode has targets, they are there as ``controller``.
     """
     index = simulation.index
     moving = _moving(simulation)
@@ -120,6 +122,8 @@ def read_state_dict(simulation: Simulation, state: State) -> StateDict:
         )
         for (name, key), root in zip(keys.items(), roots, strict=True)
     }
+    jointed = _jointed_rows(tuple(_jointed(simulation)), state)
+    articulations |= {name: torch.from_numpy(rows) for name, rows in jointed.items()}
     found: StateDict = {"actors": actors, "articulations": articulations}
     if kept := _remembered(simulation):
         found[CONTROLLER] = controllers.nested({k: torch.from_numpy(x) for k, x in kept.items()})
@@ -137,10 +141,25 @@ def _joined(*parts: Floats) -> Tensor:
     return torch.from_numpy(np.concatenate(parts, 1))
 
 
+def _jointed_rows(bodies: tuple[str, ...], state: State) -> dict[str, Floats]:
+    """Return the rows of bodies with joints, each (N, 13 + 2 · joints)."""
+    moved = zip(bodies, state.velocities(bodies), strict=True)
+    return {
+        name: np.concatenate([state.pose(name), *velocities, state.body_joints(name)], 1)
+        for name, velocities in moved
+    }
+
+
 def _moving(simulation: Simulation) -> tuple[str, ...]:
-    """Return the names of the bodies that a state dict holds."""
+    """Return the names of the bodies that a state dict holds as actors."""
     bodies = simulation.worlds[0].bodies.values()
-    return tuple(body.name for body in bodies if body.kind != "static")
+    rigid = (body for body in bodies if not body.joints and body.part_of is None)
+    return tuple(body.name for body in rigid if body.kind != "static")
+
+
+def _jointed(simulation: Simulation) -> dict[str, WorldBody]:
+    """Return the bodies that a state dict holds as articulations."""
+    return {name: body for name, body in simulation.worlds[0].bodies.items() if body.joints}
 
 
 class StateTape:
@@ -159,6 +178,8 @@ class StateTape:
         frames += [self._index.bases[name] for name in self._keys]
         self._frames = np.array(frames, np.intp)
         self._dynamic = tuple(n for n in self._bodies if world.bodies[n].kind == "dynamic")
+        self._jointed = tuple(_jointed(simulation))
+        self._parts: list[dict[str, Floats]] = []
         self._count = count = simulation.num_envs
         poses, joints, velocities = 7 * count * len(frames), count * self._index.dof, 6 * count
         widths = poses, joints, joints, velocities * len(self._dynamic)
@@ -185,6 +206,8 @@ class StateTape:
             row[self._ends[-1] :] = state.root_velocities().ravel()
         if self._simulation.modes is not None:
             self._kept.append(_remembered(self._simulation))
+        if self._jointed:
+            self._parts.append(_jointed_rows(self._jointed, state))
         self._length += 1
 
     def read(self) -> dict[str, dict[str, NDArray[np.float32]]]:
@@ -209,12 +232,39 @@ class StateTape:
             "articulations": {
                 key: np.concatenate([pose, root, self._own(qpos, name), self._own(qvel, name)], 2)
                 for (name, key), pose, root in bases
-            },
+            }
+            | {name: np.stack([rows[name] for rows in self._parts]) for name in self._jointed},
             **({CONTROLLER: kept} if kept else {}),
         }
 
     def _own(self, joints: Floats, robot: str) -> Floats:
         return native_joints(self._index, robot, joints[..., self._index.joints[robot]])
+
+
+def row_of(body: WorldBody) -> tuple[str, str]:
+    """Return group and entry of a body's row in a state dict."""
+    return ("articulations" if body.joints else "actors"), body.name
+
+
+def body_poses(world: World, states: Mapping[str, Mapping[str, NDArray[Any]]]) -> dict[str, Floats]:
+    """Return the poses of bodies that recorded states tell of, each (T, 7) (m, wxyz).
+
+    Those of parts that joints move follow from the joints.
+
+    Args:
+        world: The bodies as declared.
+        states: Rows by group and entry, each (T, k).
+    """
+    actors, articulations = (states.get(group, {}) for group in ("actors", "articulations"))
+    found = {name: rows[:, :7] for name, rows in actors.items() if name in world.bodies}
+    for name, body in world.bodies.items():
+        if body.joints and name in articulations:
+            rows = articulations[name]
+            found[name] = rows[:, :7]
+            joints = rows[:, 13 : 13 + len(body.joints)]
+            for joint, poses in part_poses(body.joints, rows[:, :7], joints).items():
+                found[part_name(name, joint)] = poses.astype(np.float32)
+    return found
 
 
 def write_state_dict(
@@ -245,7 +295,9 @@ def write_state_dict(
             pose, qpos, qvel = np.split(row, (13, 13 + simulation.layout[name].robot.dof), 1)
             joints = (declared_joints(simulation.index, name, part) for part in (qpos, qvel))
             robots[name] = np.concatenate([pose, *joints], 1)
-    simulation.write(env_ids, rows["actors"], robots)
+    jointed = _jointed(simulation)
+    things = {key: row for key, row in rows["articulations"].items() if key in jointed}
+    simulation.write(env_ids, rows["actors"] | things, robots)
     if rows.get(CONTROLLER):
         controllers.restore(simulation, rows[CONTROLLER], env_ids, _targets(simulation))
 
@@ -289,27 +341,36 @@ def _checked_rows(
 
 def _entries(simulation: Simulation) -> dict[str, dict[str, _Entry]]:
     """Return what a state dict of these worlds holds."""
-    pose = _Entry(_POSE, np.full(13, -FAR), np.full(13, FAR))
     articulations: dict[str, _Entry] = {}
     for name, key in articulation_keys(simulation.layout).items():
         built, declared = simulation.index.robots[name], simulation.layout[name].robot.joints
         joints = [declared[i] for i in built.loaded_order]
-        low, high = built.limits[list(built.loaded_order)].T
-        fastest = np.full(len(joints), FAR)
-        articulations[key] = _Entry(
-            (*_POSE, *(f"{what} of {joint}" for what in ("qpos", "qvel") for joint in joints)),
-            np.concatenate([pose.lowest, np.maximum(low - _BEYOND_LIMITS, -FAR), -fastest]),
-            np.concatenate([pose.highest, np.minimum(high + _BEYOND_LIMITS, FAR), fastest]),
-        )
+        articulations[key] = _jointed_entry(joints, *built.limits[list(built.loaded_order)].T)
+    for name, body in _jointed(simulation).items():
+        ends = np.array([(joint.lower, joint.upper) for joint in body.joints])
+        articulations[name] = _jointed_entry([joint.name for joint in body.joints], *ends.T)
     targets = {
         key: _Entry(tuple(f"number {i}" for i in range(k)), np.full(k, -FAR), np.full(k, FAR))
         for key, k in ((key, sum(e.sizes)) for key, e in _targets(simulation).items())
     }
     return {
-        "actors": dict.fromkeys(_moving(simulation), pose),
+        "actors": dict.fromkeys(_moving(simulation), _ROW),
         "articulations": articulations,
         **({CONTROLLER: targets} if targets else {}),
     }
+
+
+_ROW = _Entry(_POSE, np.full(13, -FAR), np.full(13, FAR))
+
+
+def _jointed_entry(joints: Sequence[str], low: Floats, high: Floats) -> _Entry:
+    """Return what a row of something with joints holds, whose limits are given (rad, m)."""
+    fastest = np.full(len(joints), FAR)
+    return _Entry(
+        (*_POSE, *(f"{what} of {joint}" for what in ("qpos", "qvel") for joint in joints)),
+        np.concatenate([_ROW.lowest, np.maximum(low - _BEYOND_LIMITS, -FAR), -fastest]),
+        np.concatenate([_ROW.highest, np.minimum(high + _BEYOND_LIMITS, FAR), fastest]),
+    )
 
 
 def _quaternion(group: str, key: str) -> bool:

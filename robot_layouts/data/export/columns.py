@@ -17,7 +17,7 @@ from robots import RobotDescriptor, UnknownNameError
 from tasks import TaskEnv
 from tasks.engine.columns import placed_bodies
 from tasks.episode import States
-from tasks.native.format import articulation_keys, declared_joints
+from tasks.native.format import articulation_keys, body_poses, declared_joints, row_of
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -128,7 +128,8 @@ class ColumnReader:
         self.joint_names = [
             f"{place}.{joint}" for place, p in placements for joint in p.robot.joints
         ]
-        self.bodies = placed_bodies(task.simulation.worlds[0])
+        self._world = task.simulation.worlds[0]
+        self.bodies = placed_bodies(self._world)
         self.body_names = [f"{body}.{number}" for body in self.bodies for number in POSE]
         self._keys = articulation_keys(task.layout)
         self._dof = {place: p.robot.dof for place, p in placements}
@@ -144,7 +145,8 @@ class ColumnReader:
         states = self._checked(trajectory)
         rows = {place: states["articulations"][key] for place, key in self._keys.items()}
         dof, none = self._dof, np.empty((len(trajectory.actions) + 1, 0), np.float32)
-        poses = [states["actors"][body][:, : len(POSE)] for body in self.bodies]
+        found = body_poses(self._world, states)
+        poses = [found[body] for body in self.bodies]
         return Columns(
             episode_id=trajectory.episode_id,
             seed=trajectory.seed,
@@ -196,7 +198,11 @@ class ColumnReader:
                 f"episode {trajectory.episode_id} was recorded without states, which are what is"
                 " exported; record it with env_states"
             )
-        widths = dict.fromkeys((("actors", body) for body in self.bodies), ROW)
+        widths = {
+            row_of(body): ROW + 2 * len(body.joints)
+            for name, body in self._world.bodies.items()
+            if body.joints or (name in self.bodies and body.part_of is None)
+        }
         for place, key in self._keys.items():
             widths["articulations", key] = ROW + 2 * self._dof[place]
         for (kind, name), width in widths.items():

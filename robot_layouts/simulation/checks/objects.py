@@ -12,6 +12,8 @@ import numpy as np
 
 from layouts import Layout, single
 from objects import Grasp, ObjectDescriptor
+from objects.shapes import Shape
+from objects.solids import mass_of
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.rotations import (
     Floats,
@@ -49,6 +51,7 @@ _SWAY, _PERIOD = 0.0125, 20  # m to both sides, and steps: 12 m/s²
 _WEIGHTLESS = replace(SAPIEN_DEFAULTS, gravity=(0.0, 0.0, 0.0))
 _PAD, _TIP, _ROOT = (0.02, 0.01), 0.01, -0.045  # m; of fingers: section, and ends along z
 _SQUEEZE = 0.05  # m by which fingers are driven beyond each other
+_NEXT_TO_NOTHING = 0.1  # kg/m³
 _LEAST, _PER_MASS = 8.0, 70.0  # N and N/kg: how hard jaws press
 
 
@@ -111,13 +114,22 @@ def try_rests(things: Iterable[ObjectDescriptor], time: float = STANDS) -> list[
     Raises:
         RobotLayoutsError: If one cannot be built.
     """
+    alike: dict[tuple[str, ...], list[ObjectDescriptor]] = {}
+    for thing in things:
+        alike.setdefault(tuple(joint.name for joint in thing.joints), []).append(thing)
+    return [trial for group in alike.values() for trial in _rested(group, time)]
+
+
+def _rested(things: Sequence[ObjectDescriptor], time: float) -> list[RestTrial]:
+    """Try the rests of things whose joints have the same names."""
     cases = [(thing, rest) for thing in things for rest in thing.rests]
 
     def build(world: World, number: int) -> None:
         add_table(world, textured=False)
         thing, rest = cases[number]
         place = (0.0, 0.0, thing.height(rest))
-        world.add(THING, *thing.parts, position=place, quaternion=thing.rest(rest))
+        turn, joints = thing.rest(rest), thing.joints
+        world.add(THING, *thing.parts, position=place, quaternion=turn, joints=joints)
 
     with TemporaryDirectory() as folder:
         away = Home(position=(0.0, 0.0, 3.0))
@@ -145,7 +157,8 @@ def try_thing_grasps(
 ) -> list[TriedGrasp]:
     """Grasp a thing with a flying hand of two jaws, and shake it along every axis.
 
-    Nothing has weight; the shake is stronger than that.
+    Nothing has weight; the shake is stronger than that. Joints are stiff at zero, and what is held
+    by a part that a joint moves is as light as that part: the rest of it stands somewhere.
 
     Args:
         thing: The thing.
@@ -158,8 +171,9 @@ def try_thing_grasps(
     tried = thing.grasps_for(opening) if grasps is None else tuple(grasps)
     if not tried:
         return []
+    heaviest = max(mass_of(_carried(thing, grasp)).mass for grasp in tried)
     with TemporaryDirectory() as folder:
-        hand = two_jaw_hand(opening, Path(folder), _LEAST + _PER_MASS * thing.mass)
+        hand = two_jaw_hand(opening, Path(folder), _LEAST + _PER_MASS * heaviest)
         return _shaken(thing, hand, tried)
 
 
@@ -170,7 +184,8 @@ def _shaken(
 
     def build(world: World, number: int) -> None:
         place, turned = poses[number][:3, 3].tolist(), quaternion_of(poses[number][:3, :3])
-        world.add(THING, *thing.parts, position=place, quaternion=tuple(turned.tolist()))
+        shapes, turn = _held(thing, grasps[number]), tuple(turned.tolist())
+        world.add(THING, *shapes, position=place, quaternion=turn)
 
     layout, count = single({HAND: hand}), len(grasps)
     simulation = _stood(layout, build, count, weightless=True)
@@ -203,6 +218,19 @@ def _shaken(
         )
         for i, grasp in enumerate(grasps)
     ]
+
+
+def _held(thing: ObjectDescriptor, grasp: Grasp) -> list[Shape]:
+    """Return the shapes of a thing; those weigh next to nothing that the hand does not carry."""
+    carried = _carried(thing, grasp)
+    return [
+        part if part in carried else replace(part, density=_NEXT_TO_NOTHING)
+        for part in thing.all_parts
+    ]
+
+
+def _carried(thing: ObjectDescriptor, grasp: Grasp) -> tuple[Shape, ...]:
+    return next((j.parts for j in thing.joints if j.name == grasp.part), thing.all_parts)
 
 
 def _stood(

@@ -21,6 +21,7 @@ from robot_layouts.simulation.backend import (
 from robot_layouts.simulation.maths import Flags, Floats
 from robot_layouts.simulation.sapien3.arms import InverseKinematics, PointReach
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
+from robot_layouts.simulation.sapien3.bodies import JointedBody
 from robot_layouts.simulation.sapien3.collision import described_shapes
 from robot_layouts.simulation.sapien3.contacts import (
     ArmContacts,
@@ -102,6 +103,9 @@ class SapienBackend:
         for name, rows in placements.bodies.items():
             for i, pose in rows.items():
                 self.worlds[i].place(name, pose)
+        for name, rows in placements.joints.items():
+            for i, positions in rows.items():
+                self._jointed(i, name).set_joints(positions)
 
     def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
         """Set drive targets; see `Backend`."""
@@ -146,6 +150,10 @@ class SapienBackend:
         rows = [[(*r.linear_velocity, *r.angular_velocity) for r in world] for world in roots]
         return np.array(rows, np.float32).swapaxes(0, 1)
 
+    def body_joints(self, body: str) -> Floats:
+        """Return joints of a body; see `Backend`."""
+        return np.stack([self._jointed(i, body).joints for i in range(len(self.worlds))])
+
     def forces(self, pairs: tuple[Pair, ...]) -> Floats | None:
         """Return contact forces of pairs; see `Backend`."""
         forces = self._forces.get(pairs)
@@ -158,11 +166,7 @@ class SapienBackend:
         for row, i in enumerate(env_ids):
             world = self.worlds[i]
             for name, values in bodies.items():
-                world.set_pose(name, values[row, :7].tolist())
-                if world.bodies[name].declared.kind == "dynamic":
-                    component = world.bodies[name].component
-                    component.set_linear_velocity(values[row, 7:10])
-                    component.set_angular_velocity(values[row, 10:13])
+                world.bodies[name].restore(values[row])
             for name, values in robots.items():
                 world.robots[name].restore(values[row])
 
@@ -240,6 +244,11 @@ class SapienBackend:
             return joints[0][None]
         return np.concatenate(joints).reshape(len(self.worlds), -1)
 
+    def _jointed(self, env: int, name: str) -> JointedBody:
+        body = self.worlds[env].bodies[name]
+        assert isinstance(body, JointedBody)
+        return body
+
     def _find_movers(self, wanted: tuple[Velocity, ...]) -> list[tuple[Any, str]]:
         return [
             (body.component if body.declared.kind == "dynamic" else None, f"{kind}_velocity")
@@ -260,7 +269,12 @@ def _inventory(world: BuiltWorld) -> Built:
         for name, robot in world.robots.items()
     }
     bodies = {name: place[body.entity] for name, body in world.bodies.items()}
-    return Built(len(place), bodies, robots)
+    joints = {
+        name: tuple(joint.name for joint in body.declared.joints)
+        for name, body in world.bodies.items()
+        if body.declared.joints
+    }
+    return Built(len(place), bodies, robots, joints)
 
 
 def _pose_places(worlds: int, frames: int) -> NDArray[np.intp]:

@@ -24,6 +24,7 @@ from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.simulation.sapien3.light_meshes import light_parts
 from robot_layouts.simulation.world import Visuals
 from robots import AssetError, GripperMaterial
+from robots.descriptor import Vector3
 from robots.urdf.mesh_files import read_corners
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
@@ -84,7 +85,7 @@ def make_builder(
 
 
 def _set_joint(link: Any, joint: ModelJoint, text: Element) -> None:
-    frame = _pose(_frame_along(joint.axis))
+    frame = joint_frame(joint.axis)
     limits = [] if joint.type == "fixed" else [[-inf, inf]]
     if joint.lower is not None and joint.upper is not None:
         limits = [[joint.lower, joint.upper]]
@@ -95,8 +96,18 @@ def _set_joint(link: Any, joint: ModelJoint, text: Element) -> None:
     )
 
 
-def _frame_along(axis: tuple[float, float, float]) -> Floats:
-    """Return axes, as columns, the first of which is that of a joint, along which SAPIEN moves."""
+def joint_frame(axis: Vector3, at: Vector3 = (0.0, 0.0, 0.0)) -> sapien.Pose:
+    """Return the pose of a joint in a link, along or about whose x axis SAPIEN moves it.
+
+    Args:
+        axis: Of the joint, in the link's frame.
+        at: A point on it (m).
+    """
+    return _pose(_frame_along(axis), at)
+
+
+def _frame_along(axis: Vector3) -> Floats:
+    """Return axes, as columns, the first of which is that of a joint."""
     x = np.array(axis if any(axis) else (1.0, 0.0, 0.0))  # a fixed joint may have any
     y = np.cross(x, (0.0, 0.0, 1.0) if abs(x[0]) > 0.9 else (1.0, 0.0, 0.0))
     y /= np.linalg.norm(y)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import sapien
 import sapien.physx as physx
 
 from layouts import Layout
-from objects.shapes import Shape
 from robot_layouts.core.portable import is_portable
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from robot_layouts.simulation.sapien3.blueprint import Blueprint, read_blueprint
-from robot_layouts.simulation.sapien3.collision import add_collision, attach_hulls
-from robot_layouts.simulation.sapien3.collision_groups import FLOOR
+from robot_layouts.simulation.sapien3.bodies import BuiltBody, build_bodies
 from robot_layouts.simulation.sapien3.device import expect_render_device, outlive_forks
 from robot_layouts.simulation.sapien3.exact_division import divide_exactly
 from robot_layouts.simulation.sapien3.robot import SimulatedRobot
@@ -52,22 +50,6 @@ def apply_settings(settings: PhysicsSettings) -> None:
     )
     friction = settings.friction
     physx.set_default_material(friction.static, friction.dynamic, friction.restitution)
-
-
-class BuiltBody(NamedTuple):
-    """A body in SAPIEN.
-
-    Attributes:
-        declared: What the task declared.
-        entity: SAPIEN's entity.
-        component: Its physics component.
-        start_pose: Pose it was built at.
-    """
-
-    declared: WorldBody
-    entity: sapien.Entity
-    component: Any
-    start_pose: sapien.Pose
 
 
 class BuiltWorld:
@@ -141,35 +123,18 @@ class BuiltWorld:
         self.studio: Any = None  # as long as this world lives, also in a fork
 
     def add(self, body: WorldBody) -> BuiltBody:
-        """Build a body."""
-        builder = self.scene.create_actor_builder()
-        for shape in body.shapes:
-            add_collision(builder, shape)
-        builder.set_physx_body_type(body.kind)
-        pose = sapien.Pose(list(body.position), list(body.quaternion))
-        builder.set_initial_pose(pose)
-        entity = builder.build(body.name)
-        if self.visuals:
-            _draw(entity, body.shapes)
-        component: Any = entity.find_component_by_type(
-            physx.PhysxRigidStaticComponent
-            if body.kind == "static"
-            else physx.PhysxRigidDynamicComponent
-        )
-        attach_hulls(component, body.shapes)
-        for shape in component.collision_shapes:
-            if isinstance(shape, physx.PhysxCollisionShapePlane):
-                shape.set_collision_groups([*FLOOR, 0, 0])
+        """Build a body, and the parts that its joints move."""
+        built, *parts = build_bodies(self.scene, body, visuals=bool(self.visuals))
         if body.scale != 1.0:
-            pose = _on_its_place(body, component, pose)
-        built = self.bodies[body.name] = BuiltBody(body, entity, component, pose)
+            built.start_pose = _on_its_place(body, built.component, built.start_pose)
+        self.bodies.update((each.declared.name, each) for each in (built, *parts))
         return built
 
     def settle(self) -> None:
         """End the build: set every start pose once more, as native does."""
         for body in self.bodies.values():
             if body.declared.kind != "static":
-                body.entity.set_pose(body.start_pose)
+                body.set_pose(body.start_pose)
         for robot in self.robots.values():
             robot.articulation.set_root_pose(robot.base_pose)
 
@@ -179,14 +144,12 @@ class BuiltWorld:
         PhysX keeps its contact caches: a reset world remembers, a rebuilt one does not.
         """
         for body in self.bodies.values():
-            if body.declared.kind == "dynamic":
-                body.component.set_linear_velocity([0.0, 0.0, 0.0])
-                body.component.set_angular_velocity([0.0, 0.0, 0.0])
+            body.stop()
         for robot in self.robots.values():
             robot.stop()
         for body in self.bodies.values():
             if body.declared.anchored:
-                body.entity.set_pose(body.start_pose)
+                body.set_pose(body.start_pose)
 
     def stepper(self) -> Callable[[], None]:
         """Return what advances physics by one step."""
@@ -204,7 +167,7 @@ class BuiltWorld:
 
     def set_pose(self, name: str, row: list[float]) -> None:
         """Move a body to a position (m) and quaternion (wxyz), (7,)."""
-        self.bodies[name].entity.set_pose(sapien.Pose(row[:3], row[3:]))
+        self.bodies[name].set_pose(sapien.Pose(row[:3], row[3:]))
 
     def place(self, name: str, row: list[float]) -> None:
         """Move a body to where the task wants it; see `scale`."""
@@ -212,7 +175,7 @@ class BuiltWorld:
         body = self.bodies[name]
         if body.declared.scale != 1.0:
             pose = sapien.Pose(row[:3], row[3:])
-            body.entity.set_pose(_on_its_place(body.declared, body.component, pose))
+            body.set_pose(_on_its_place(body.declared, body.component, pose))
 
 
 def build_world(world: World, blueprints: dict[RobotDescriptor, Blueprint]) -> BuiltWorld:
@@ -226,7 +189,8 @@ def build_world(world: World, blueprints: dict[RobotDescriptor, Blueprint]) -> B
     )
     built.shadows = world.shadows
     for body in world.bodies.values():
-        built.add(body)
+        if body.part_of is None:
+            built.add(body)
     built.settle()
     return built
 
@@ -238,14 +202,6 @@ def _on_its_place(body: WorldBody, component: Any, pose: sapien.Pose) -> sapien.
     lowest = float(component.compute_global_aabb_tight()[0][2])
     x, y, z = (float(value) for value in pose.p)
     return sapien.Pose([x, y, z + (z - lowest) * (body.scale - 1) / body.scale], pose.q)
-
-
-def _draw(entity: sapien.Entity, shapes: tuple[Shape, ...]) -> None:
-    from robot_layouts.simulation.sapien3.visuals import visual_component
-
-    component = visual_component(shapes)
-    if component is not None:
-        entity.add_component(component)
 
 
 def _render_system() -> Any:

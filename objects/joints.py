@@ -1,0 +1,119 @@
+"""Joints of things: parts that slide or turn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import hypot
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from objects.shapes import Coordinate, Place, Shape, scaled
+from robot_layouts.core.bounds import checked_number
+from robot_layouts.core.errors import DescriptorError, UnknownNameError
+from robot_layouts.core.schema import check_fields, within
+
+Coefficient = Annotated[float, within(0.0, 1e6)]
+Position = Annotated[float, within(-1e3, 1e3)]
+_NAME = Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*\Z", description="a letter, then letters, digits, _")
+_UNIT = 1e-6  # of the length of an axis
+
+
+@dataclass(frozen=True, kw_only=True)
+class Joint:
+    """A part of a thing that slides or turns.
+
+    Everything is in the thing's own frame, as it is with all joints at zero. Positions are in m
+    for a part that slides, in rad for one that turns by the right-hand rule.
+
+    Attributes:
+        name: Its name, which is also that of the part.
+        kind: ``"slide"`` or ``"turn"``.
+        parts: The shapes that move.
+        axis: Along which the part slides, or about which it turns; of length 1.
+        at: A point on that axis (m).
+        lower: Where it stops.
+        upper: Likewise.
+        start: Where episodes begin with it.
+        friction: Coefficient of dry friction, as that of a robot's joints.
+        damping: N·s/m, or N·m·s/rad.
+        stiffness: Of a spring that pulls it towards ``rest``: N/m, or N·m/rad.
+        rest: Where that spring is slack.
+        carrier: Joint whose part carries this one; None if the thing's body does.
+    """
+
+    name: Annotated[str, _NAME]
+    kind: Literal["slide", "turn"]
+    parts: tuple[Shape, ...]
+    axis: tuple[Coordinate, Coordinate, Coordinate]
+    at: Place = (0.0, 0.0, 0.0)
+    lower: Position = 0.0
+    upper: Position
+    start: Position = 0.0
+    friction: Coefficient = 0.0
+    damping: Coefficient = 0.0
+    stiffness: Coefficient = 0.0
+    rest: Position = 0.0
+    carrier: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what no joint can be.
+
+        Raises:
+            DescriptorError: If a value is of a wrong type or out of bounds.
+        """
+        check_fields(self, DescriptorError)
+        if abs(hypot(*self.axis) - 1) > _UNIT:
+            raise DescriptorError(f"joint {self.name}: axis {self.axis} must be of length 1")
+        if not self.lower < self.upper:
+            raise DescriptorError(
+                f"joint {self.name}: lower is {self.lower:g}, upper {self.upper:g}; the lower one"
+                " must be the smaller"
+            )
+        self.check(self.start)
+        if not any(part.collides for part in self.parts):
+            raise DescriptorError(f"joint {self.name}: no part collides, so that it has no mass")
+
+    @property
+    def unit(self) -> str:
+        """Of its positions."""
+        return "m" if self.kind == "slide" else "rad"
+
+    def check(self, position: float) -> float:
+        """Return a position that it can have.
+
+        Raises:
+            DescriptorError: If it cannot.
+        """
+        what = f"joint {self.name}"
+        return checked_number(what, position, self.lower, self.upper, DescriptorError, self.unit)
+
+    def scaled(self, factor: float) -> Joint:
+        """Return it larger by a factor."""
+        x, y, z = self.at
+        ends = {name: getattr(self, name) for name in ("lower", "upper", "start", "rest")}
+        longer = factor if self.kind == "slide" else 1.0
+        return replace(
+            self,
+            parts=tuple(scaled(part, factor) for part in self.parts),
+            at=(x * factor, y * factor, z * factor),
+            **{name: end * longer for name, end in ends.items()},
+        )
+
+
+def checked_joints(owner: str, joints: Sequence[Joint]) -> tuple[Joint, ...]:
+    """Return the joints of a thing, each after the one that carries it.
+
+    Raises:
+        DescriptorError: If two have the same name.
+        UnknownNameError: If one is carried by none of those before it.
+    """
+    known = dict[str, Joint]()
+    for joint in joints:
+        if joint.name in known:
+            raise DescriptorError(f"{owner}: two joints are called {joint.name!r}")
+        if joint.carrier is not None and joint.carrier not in known:
+            raise UnknownNameError(f"joint of {owner} before {joint.name!r}", joint.carrier, known)
+        known[joint.name] = joint
+    return tuple(known.values())

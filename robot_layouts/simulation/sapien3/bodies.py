@@ -1,0 +1,214 @@
+"""A task's bodies in SAPIEN: rigid ones, and those whose joints move parts of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import sapien
+import sapien.physx as physx
+from numpy.typing import NDArray
+from sapien.wrapper.articulation_builder import ArticulationBuilder
+
+from objects.shapes import Shape
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.sapien3.builder import joint_frame
+from robot_layouts.simulation.sapien3.collision import add_collision, attach_hulls
+from robot_layouts.simulation.sapien3.collision_groups import FLOOR
+from robot_layouts.simulation.world import WorldBody, part_name
+
+_STILL = np.zeros(3, np.float32)
+_KINDS = {"slide": "prismatic", "turn": "revolute_unwrapped"}
+
+
+@dataclass(eq=False)
+class BuiltBody:
+    """A rigid body in SAPIEN.
+
+    Attributes:
+        declared: What the task declared.
+        entity: SAPIEN's entity.
+        component: Its physics component.
+        start_pose: Pose it was built at.
+    """
+
+    declared: WorldBody
+    entity: sapien.Entity
+    component: Any
+    start_pose: sapien.Pose
+
+    def set_pose(self, pose: sapien.Pose) -> None:
+        """Move it."""
+        self.entity.set_pose(pose)
+
+    def stop(self) -> None:
+        """Zero its velocities, if physics moves it."""
+        if self.declared.kind == "dynamic":
+            self.component.set_linear_velocity([0.0, 0.0, 0.0])
+            self.component.set_angular_velocity([0.0, 0.0, 0.0])
+
+    def restore(self, row: NDArray[np.float32]) -> None:
+        """Take over a state row: pose (m, wxyz), linear (m/s) and angular velocity (rad/s)."""
+        self.set_pose(sapien.Pose(row[:3].tolist(), row[3:7].tolist()))
+        if self.declared.kind == "dynamic":
+            self.component.set_linear_velocity(row[7:10])
+            self.component.set_angular_velocity(row[10:13])
+
+
+class BuiltPart(BuiltBody):
+    """What a joint of a body moves; it goes where its body and the joints say."""
+
+    def set_pose(self, pose: sapien.Pose) -> None:
+        """Leave it to its body."""
+
+    def stop(self) -> None:
+        """Leave it to its body."""
+
+
+class JointedBody(BuiltBody):
+    """A body with joints: an articulation, whose root is held unless physics moves the body.
+
+    Attributes:
+        articulation: SAPIEN's articulation.
+    """
+
+    def __init__(self, declared: WorldBody, articulation: Any, pose: sapien.Pose) -> None:
+        """Take what was built, with its joints where they start."""
+        root = articulation.links[0]
+        super().__init__(declared, root.entity, root, pose)
+        self.articulation = articulation
+        active = [joint.name for joint in articulation.active_joints]
+        self._order = [active.index(joint.name) for joint in declared.joints]
+        for joint, built in zip(declared.joints, self._ordered(), strict=True):
+            built.set_drive_properties(joint.stiffness, joint.damping)
+            built.set_drive_target(joint.rest)
+            built.set_friction(joint.friction)
+        self.stop()
+
+    def _ordered(self) -> list[Any]:
+        active = self.articulation.active_joints
+        return [active[i] for i in self._order]
+
+    @property
+    def joints(self) -> Floats:
+        """Positions, then velocities of its joints, (2 · joints,) (m, rad, and per s)."""
+        qpos, qvel = self.articulation.qpos, self.articulation.qvel
+        return np.concatenate([qpos[self._order], qvel[self._order]])
+
+    def set_pose(self, pose: sapien.Pose) -> None:
+        """Move its root; its joints stay where they are."""
+        self.articulation.set_root_pose(pose)
+
+    def set_joints(self, positions: Mapping[str, float]) -> None:
+        """Move some of its joints, at rest."""
+        joints = self.joints[: len(self._order)]
+        for i, joint in enumerate(self.declared.joints):
+            joints[i] = positions.get(joint.name, joints[i])
+        self._set(joints, np.zeros_like(joints))
+
+    def stop(self) -> None:
+        """Put its joints where they start, and zero all velocities."""
+        start = np.array([joint.start for joint in self.declared.joints], np.float32)
+        self._set(start, np.zeros_like(start))
+        self.articulation.set_root_linear_velocity(_STILL)
+        self.articulation.set_root_angular_velocity(_STILL)
+
+    def restore(self, row: NDArray[np.float32]) -> None:
+        """Take over a state row: that of a rigid body, then positions and velocities of joints."""
+        self.articulation.set_root_pose(sapien.Pose(row[:3].tolist(), row[3:7].tolist()))
+        self.articulation.set_root_linear_velocity(row[7:10])
+        self.articulation.set_root_angular_velocity(row[10:13])
+        self._set(*np.split(row[13:], 2))
+
+    def _set(self, qpos: Floats, qvel: Floats) -> None:
+        active = np.empty((2, len(self._order)), np.float32)
+        active[:, self._order] = qpos, qvel
+        self.articulation.set_qpos(active[0])
+        self.articulation.set_qvel(active[1])
+        self.articulation.set_qf(np.zeros_like(active[0]))
+
+
+def build_bodies(scene: sapien.Scene, body: WorldBody, *, visuals: bool) -> Iterator[BuiltBody]:
+    """Build a body, and the parts that its joints move.
+
+    Args:
+        scene: SAPIEN's scene.
+        body: What a task declared.
+        visuals: Whether to build what pictures need.
+    """
+    pose = sapien.Pose(list(body.position), list(body.quaternion))
+    if not body.joints:
+        yield _rigid(scene, body, pose, visuals=visuals)
+        return
+    articulation = _articulation(scene, body, pose)
+    links = {link.name: link for link in articulation.links}
+    for name, shapes in _links(body):
+        _finish(links[name].entity, links[name], shapes, visuals=visuals)
+    yield JointedBody(body, articulation, pose)
+    for joint in body.joints:
+        name = part_name(body.name, joint.name)
+        declared = WorldBody(name, joint.parts, marker=body.marker, part_of=body.name)
+        yield BuiltPart(declared, links[name].entity, links[name], links[name].entity.pose)
+
+
+def _rigid(scene: sapien.Scene, body: WorldBody, pose: sapien.Pose, *, visuals: bool) -> BuiltBody:
+    builder = scene.create_actor_builder()
+    for shape in body.shapes:
+        add_collision(builder, shape)
+    builder.set_physx_body_type(body.kind)
+    builder.set_initial_pose(pose)
+    entity = builder.build(body.name)
+    component: Any = entity.find_component_by_type(
+        physx.PhysxRigidStaticComponent
+        if body.kind == "static"
+        else physx.PhysxRigidDynamicComponent
+    )
+    _finish(entity, component, body.shapes, visuals=visuals)
+    for shape in component.collision_shapes:
+        if isinstance(shape, physx.PhysxCollisionShapePlane):
+            shape.set_collision_groups([*FLOOR, 0, 0])
+    return BuiltBody(body, entity, component, pose)
+
+
+def _articulation(scene: sapien.Scene, body: WorldBody, pose: sapien.Pose) -> Any:
+    builder: Any = ArticulationBuilder()
+    builder.set_initial_pose(pose)
+    made: dict[str | None, Any] = {}
+    for joint, (name, shapes) in zip((None, *body.joints), _links(body), strict=True):
+        link = builder.create_link_builder(joint and made[joint.carrier])
+        made[joint and joint.name] = link
+        link.set_name(name)
+        for shape in shapes:
+            add_collision(link, shape)
+        if joint is None:
+            held = "undefined" if body.kind == "dynamic" else "fixed"
+            link.set_joint_properties(held, [], sapien.Pose(), sapien.Pose())
+        else:
+            frame = joint_frame(joint.axis, joint.at)
+            link.set_joint_name(joint.name)
+            limits = [[joint.lower, joint.upper]]
+            link.set_joint_properties(_KINDS[joint.kind], limits, frame, frame)
+    articulation = builder.set_scene(scene).build()
+    articulation.name = body.name
+    return articulation
+
+
+def _links(body: WorldBody) -> list[tuple[str, tuple[Shape, ...]]]:
+    """Return the names and shapes of a jointed body's links, its root's first."""
+    parts = [(part_name(body.name, joint.name), joint.parts) for joint in body.joints]
+    return [(body.name, body.shapes), *parts]
+
+
+def _finish(
+    entity: sapien.Entity, component: Any, shapes: tuple[Shape, ...], *, visuals: bool
+) -> None:
+    """Give an entity what pictures need, and the hulls that SAPIEN's builder cannot make."""
+    if visuals:
+        from robot_layouts.simulation.sapien3.visuals import visual_component
+
+        drawn = visual_component(shapes)
+        if drawn is not None:
+            entity.add_component(drawn)
+    attach_hulls(component, shapes)
