@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
-from objects.families.furniture import FRONT, LEAN, SIDE, handle
+from objects.families.furniture import FRONT, SIDE, TILTS, handle
 from objects.families.making import (
     DARK_WOOD,
     GREY_PLASTIC,
@@ -28,9 +28,8 @@ from objects.family import Made, Size, family
 from objects.joints import Joint
 
 GAP = 0.001  # m
-HALF = around(8, 0.0, pi)
+FACES = around(4, pi / 8, 9 * pi / 8)  # rad; of an octagon
 PITCHES = (-0.3, 0.0, 0.3)  # rad
-TILTS = (-0.3, -0.15, 0.0, 0.15, 0.3)  # rad
 NEAR = (-0.008, 0.008)  # m
 
 
@@ -82,7 +81,7 @@ def dial(radius: float, height: float) -> Made:
     pointer = block((0.01, 0.004, 0.004), (radius - 0.006, 0.0, high + 0.002), RED_PLASTIC)
     return Made(
         [block((0.14, 0.1, height), (0.0, 0.0, height / 2), GREY_PLASTIC)],
-        from_above((low + high) / 2 + 0.003, 2 * radius * cos(pi / 8), "knob", HALF, PITCHES),
+        from_above((low + high) / 2 + 0.003, 2 * radius * cos(pi / 8), "knob", FACES, PITCHES),
         {"top": point(0.0, 0.0, high)},
         joints=[
             Joint(
@@ -195,7 +194,7 @@ def tap(reach: float, height: float) -> Made:
             disc(0.018, 0.012, height, STEEL),
             rod((0.0, 0.0, height - 0.03), (reach, 0.0, height - 0.03), 0.01, STEEL),
         ],
-        grips((0.035, 0.0, top + 0.012), FRONT, UP, 0.016, "handle", offsets=NEAR, tilts=LEAN),
+        grips((0.035, 0.0, top + 0.012), FRONT, UP, 0.016, "handle", offsets=NEAR, tilts=TILTS),
         {"spout": point(reach, 0.0, height - 0.04, (0.0, 0.0, -1.0))},
         joints=[
             Joint(
@@ -350,7 +349,7 @@ def slider(length: float, height: float) -> Made:
             UP,
             0.02,
             "cap",
-            tilts=LEAN,
+            tilts=TILTS,
             pitches=PITCHES,
         ),
         {"cap": point(-travel / 2, 0.0, z + 0.03)},

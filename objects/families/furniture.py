@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from math import pi
 
+import numpy as np
+
 from objects.families.making import (
     CARDBOARD,
     DARK_WOOD,
@@ -24,6 +26,7 @@ from objects.families.making import (
     grips,
     loop,
     point,
+    rod,
     taper,
     tube,
     walls,
@@ -38,6 +41,7 @@ GAP = 0.002  # m; between what moves and what holds it
 WALL = 0.008
 BAR, STANDOFF = 0.012, 0.045  # of handles: their thickness, and how far from the surface
 DOWNWARD = (-0.45, -0.3, -0.15, 0.0)  # rad
+TILTS = (-0.3, -0.15, 0.0, 0.15, 0.3)  # rad
 LEAN = (-0.6, -0.3, 0.0, 0.3, 0.6)  # rad
 ALONG = (-0.02, 0.0, 0.02)  # m along a handle
 
@@ -49,11 +53,12 @@ BOX = {
 
 
 def handle(middle: Axis, along: Axis, out: Axis, length: float, part: str) -> Made:
-    """Return a handle on a surface, and the grasps of it."""
-    shapes = loop(middle, along, out, STANDOFF, length, BAR, STEEL)
-    held = tuple(a + STANDOFF * b for a, b in zip(middle, out, strict=True))
-    x, y, z = held
-    return Made(shapes, grips((x, y, z), along, out, BAR, part, offsets=ALONG, tilts=LEAN))
+    """Return a handle on a surface: a round bar that two arms hold, and the grasps of it."""
+    _, *arms = loop(middle, along, out, STANDOFF, length, BAR, STEEL)
+    x, y, z = (a + STANDOFF * b for a, b in zip(middle, out, strict=True))
+    ends = [np.add((x, y, z), np.multiply(along, side * length / 2)) for side in (-1, 1)]
+    held = rod(*ends, BAR / 2, STEEL)
+    return Made([held, *arms], grips((x, y, z), along, out, BAR, part, offsets=ALONG, tilts=LEAN))
 
 
 def case(length: float, width: float, bottom: float, top: float, made_of: Matter) -> list[Shape]:
@@ -271,7 +276,7 @@ def swing_bin(length: float, height: float) -> Made:
             0.012,
             "flap",
             offsets=ALONG,
-            tilts=LEAN,
+            tilts=TILTS,
         ),
         {"inside": point(0.0, 0.0, wall)},
         joints=[
