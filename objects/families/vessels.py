@@ -345,7 +345,7 @@ def can(radius: float, height: float) -> Made:
     )
     return Made(
         [disc(radius, 0.0, height, TIN)],
-        sides,
+        sides + from_above(height - 0.025, 2 * radius, "body", around(6, 0.0, pi)),
         {"top": point(0.0, 0.0, height), "bottom": point(0.0, 0.0, 0.0, DOWN)},
         {"upright": IDENTITY, "lying": ON_SIDE},
     )

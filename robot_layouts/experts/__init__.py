@@ -7,6 +7,8 @@ Writing one, which is a function of a task and a seed:
     first_success: Tries scripts in a private copy of the task; the actions of the first that works.
     Script, Waypoint, Scene: What each robot does, one thing after the other, in worlds as seen now.
     pick, cube_grips, thing_grips: Waypoints that grasp a body, and where a gripper may hold it.
+    move_joint, moved_along: Waypoints that open or turn what a gripper holds.
+    in_reach: Those grips that an arm can come to.
     need_fingers: Refuses robots that cannot.
     bringing, holding, held_at, is_near: Where the gripper goes with what it holds.
     gripper_facing, turn, yaw_of, heading, backed_off, planar_distance: Poses and headings.
@@ -40,7 +42,10 @@ from robot_layouts.experts.grasps import (
     cube_grips,
     held_at,
     holding,
+    in_reach,
     is_near,
+    move_joint,
+    moved_along,
     need_fingers,
     pick,
     thing_grips,
@@ -80,8 +85,11 @@ __all__ = [
     "heading",
     "held_at",
     "holding",
+    "in_reach",
     "is_near",
     "list_experts",
+    "move_joint",
+    "moved_along",
     "need_fingers",
     "pick",
     "planar_distance",

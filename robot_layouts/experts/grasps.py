@@ -193,6 +193,38 @@ def lowerable(
     return kept
 
 
+def in_reach(
+    task: TaskEnv,
+    robot: str,
+    grips: Callable[[Scene], Sequence[Pose]],
+    *,
+    above: float = 0.05,
+    on: Callable[[Scene, Pose], Sequence[Pose]] = lambda scene, grip: (),
+) -> Callable[[Scene], list[Pose]]:
+    """Return those of some grips that an arm gets to from where `pick` lets it get ready.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm.
+        grips: The grips, given the scene.
+        above: As `pick` takes it (m).
+        on: Where else a gripper with one of them has to get, one pose after the other.
+    """
+    solver, descriptor = pose_solver(task, robot), task.layout.arm(robot).robot
+    places = [descriptor.joints.index(joint) for joint in descriptor.arm_joints]
+
+    def reaches(scene: Scene, grip: Pose) -> bool:
+        qpos = scene.qpos(robot)
+        for pose in (backed_off(grip, above), grip, *on(scene, grip)):
+            arm = solver.solve(*pose, qpos)
+            if arm is None:
+                return False
+            qpos[places] = arm
+        return True
+
+    return lambda scene: [grip for grip in grips(scene) if reaches(scene, grip)]
+
+
 def pick(
     robot: str,
     body: str,
@@ -229,6 +261,48 @@ def pick(
         Waypoint(f"around {body}", grips, opening, near=around, most=most),
         Waypoint(f"grasp {body}", None, CLOSED, steps=2, until=held, most=most),
     )
+
+
+def move_joint(
+    robot: str, body: str, joint: str, to: float, *, steps: int = 8, most: int | None = None
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints with which a gripper moves a joint of a body whose part it holds.
+
+    They are called by the part's name and their number, from 0 on.
+
+    Args:
+        robot: Whose gripper.
+        body: The body.
+        joint: Its joint.
+        to: Where the joint is to be (m or rad).
+        steps: Number of waypoints, which are evenly apart.
+        most: How many control steps each may take.
+    """
+    def then(scene: Scene, left: int) -> list[Pose]:
+        now = scene.joints(body)[joint]
+        return [moved_along(scene, body, joint, now + (to - now) / left, scene.tcp(robot))]
+
+    name = part_name(body, joint)
+    return tuple(
+        Waypoint(f"{name} {i}", partial(then, left=steps - i), CLOSED, most=most)
+        for i in range(steps)
+    )
+
+
+def moved_along(scene: Scene, body: str, joint: str, position: float, pose: Pose) -> Pose:
+    """Return where a gripper goes with the part of a body that it holds.
+
+    Args:
+        scene: As it is now.
+        body: The body.
+        joint: Its joint.
+        position: Where the joint is then (m or rad).
+        pose: Of the gripper now.
+    """
+    place, turned = scene.part(body, joint, position)
+    start, before = scene.body(part_name(body, joint))
+    turn_by = multiply(turned, inverse(before))
+    return place + rotate(turn_by, pose[0] - start), multiply(turn_by, pose[1])
 
 
 def holding(scene: Scene, robot: str, body: str, place: Floats, quaternion: Floats) -> Pose:

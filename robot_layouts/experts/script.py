@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from objects.solids import part_poses
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation import State
 from robot_layouts.simulation.world import WorldBody
@@ -39,6 +40,19 @@ class Scene:
     def body(self, name: str) -> Pose:
         """Return the pose of a body."""
         return _split(self._state.pose(name)[0])
+
+    def joints(self, name: str) -> dict[str, float]:
+        """Return where the joints of a body are, by name (m, rad)."""
+        (body,) = (body for body in self.bodies if body.name == name)
+        return {j.name: float(self._state.joint(name, j.name)[0]) for j in body.joints}
+
+    def part(self, name: str, joint: str, position: float) -> Pose:
+        """Return the pose that a part of a body has when its joint is somewhere (m or rad)."""
+        (body,) = (body for body in self.bodies if body.name == name)
+        there = self.joints(name) | {joint: position}
+        root = np.concatenate(self.body(name))[None]
+        pose = part_poses(body.joints, root, np.array([list(there.values())]))[joint][0]
+        return pose[:3], pose[3:]
 
     def scale(self, name: str) -> float:
         """Return how much larger a body is in this episode than it was declared, as a factor."""
