@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from hashlib import sha256
+from math import degrees
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from benchmarks.records import (
     write_page,
     write_record,
 )
-from objects import ObjectDescriptor, ObjectRegistry
+from objects import Joint, ObjectDescriptor, ObjectRegistry
 from objects.picture import save_sheet
 from objects.registry import CATALOGUE
 from robot_layouts.simulation.checks.objects import OPENINGS, try_rests, try_thing_grasps
@@ -32,6 +33,7 @@ HEADINGS = (
     "size (cm)",
     "mass (kg)",
     "points",
+    "joints",
     "rests",
     "drift (mm)",
     *(f"held, {opening * 100:g} cm" for opening in OPENINGS),
@@ -64,14 +66,14 @@ def objects(
         everything = [ObjectRegistry.load(name) for name in CATALOGUE]
         save_sheet(everything, out.parent / PICTURE)
     rows = [(name, *_cells(seen)) for name, seen in record["objects"].items()]
-    shown = table(HEADINGS, rows, numbers=(2, 5, 6, 7, 8))
+    shown = table(HEADINGS, rows, numbers=(2, 6, 7, 8, 9))
     write_page(out, "objects", count=len(rows), versions=record["versions"], table=shown)
     return 0
 
 
 def digest_of(thing: ObjectDescriptor) -> str:
-    """Return what changes with a thing's shapes, rests and grasps."""
-    text = repr((thing.parts, sorted(thing.rests.items()), thing.grasps))
+    """Return what changes with a thing's shapes, rests, grasps and joints."""
+    text = repr((thing.parts, sorted(thing.rests.items()), thing.grasps, *thing.joints))
     return sha256(text.encode()).hexdigest()[:16]
 
 
@@ -86,15 +88,23 @@ def _tried(thing: ObjectDescriptor) -> Record:
         "size": [round(100 * length, 1) for length in thing.extent],
         "mass": float(f"{thing.mass:.2g}"),
         "points": list(thing.points),
+        "joints": {joint.name: _travel(joint) for joint in thing.joints},
         "drift": rests,
         "grasps": grasps,
     }
+
+
+def _travel(joint: Joint) -> str:
+    if joint.kind == "slide":
+        return f"slides {100 * (joint.upper - joint.lower):.3g} cm"
+    return f"turns {degrees(joint.upper - joint.lower):.0f}°"
 
 
 def _cells(seen: Mapping[str, Any]) -> Iterator[str]:
     yield " × ".join(f"{length:g}" for length in seen["size"])
     yield f"{seen['mass']:g}"
     yield ", ".join(f"`{name}`" for name in seen["points"])
+    yield ", ".join(f"`{name}` {travel}" for name, travel in seen.get("joints", {}).items()) or "–"
     yield ", ".join(seen["drift"])
     yield f"{max(seen['drift'].values()):.3f}"
     for held, tried in seen["grasps"].values():
