@@ -362,8 +362,9 @@ class Object(Body):
         rest: Which of its ``rests`` it lies in; None for the first.
         seed: Draws a member of its family; None takes the usual one.
         scale: Factor on its lengths.
-        joints: Where episodes begin with its joints (m, rad), by name: a number, or the smallest
-            and the largest that may be drawn. Those that are left out begin at their own start.
+        joints: Where episodes begin with its joints, by name: a number, or the smallest and the
+            largest that may be drawn (rad; m in a thing of scale 1). Those that are left out begin
+            at their own start.
     """
 
     thing: ObjectDescriptor | str
@@ -385,7 +386,7 @@ class Object(Body):
         self.descriptor.rest(self.rest)
         for name, value in self.joints.items():
             for end in _bounds(f"Object: joint {name}", value):
-                self.descriptor.joint(name).check(end)
+                _loaded(self.thing, self.seed, 1.0).joint(name).check(end)
 
     @property
     def descriptor(self) -> ObjectDescriptor:
@@ -420,8 +421,12 @@ class Object(Body):
         super().place(world, name, rng)
         if self.joints:
             lows, highs = zip(*(_bounds(*each) for each in self.joints.items()), strict=True)
-            drawn = rng.uniform_between(lows, highs).tolist()
-            world.set_joints(name, **dict(zip(self.joints, drawn, strict=True)))
+            drawn = zip(self.joints, rng.uniform_between(lows, highs).tolist(), strict=True)
+            scale = self.scale * world.body(name).scale
+            world.set_joints(name, **{j: self._scaled(j, at, scale) for j, at in drawn})
+
+    def _scaled(self, joint: str, position: float, scale: float) -> float:
+        return position * scale if self.descriptor.joint(joint).kind == "slide" else position
 
 
 @lru_cache(maxsize=256)

@@ -105,11 +105,12 @@ def _parts(simulation: Simulation, fit: Callable[[WorldBody], bool]) -> dict[str
 
 
 def _sized_bodies(simulation: Simulation) -> dict[str, tuple[str, ...]]:
-    """Return the bodies that have a size, and are no furniture that every reset puts back."""
+    """Return the bodies that have a size of their own, and that no reset puts back as furniture."""
     return _by_name(
         body.name
         for body in simulation.worlds[0].bodies.values()
-        if not body.anchored and all(isinstance(shape, SIZED) for shape in body.shapes)
+        if not (body.anchored or body.part_of)
+        and all(isinstance(shape, SIZED) for shape in body.shapes)
     )
 
 

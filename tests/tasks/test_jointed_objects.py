@@ -16,8 +16,9 @@ from robot_layouts.experts import thing_grips
 from robot_layouts.experts.obstacles import obstacles
 from robot_layouts.experts.script import Scene
 from robots import DescriptorError, TaskError, UnknownNameError
-from tasks import Area, MultiRobotTask, Object, register_task
+from tasks import Area, Fixed, MultiRobotTask, Object, Randomization, register_task
 from tasks.episode import play
+from tasks.language.fitting import Fit
 from tasks.view import recorded_motion, task_cell
 
 ID = "TestOpenUp-v1"
@@ -127,6 +128,19 @@ def test_obstacles_and_grips_go_with_the_parts():
     (other, _), *_ = thing_grips(closed, "case", 0.08, lean=np.pi)(scene)
     opened = env.state.joint("case", "drawer")[0]
     assert np.linalg.norm(place - other) == pytest.approx(opened, abs=1e-6)
+
+
+def test_a_larger_thing_begins_as_far_open_and_its_parts_have_no_size_of_their_own():
+    env = tasks.make(ID, randomization=Randomization(size={"case": Fixed(1.5)}))
+    env.reset(seed=0)
+    plain = tasks.make(ID)
+    plain.reset(seed=0)
+    opened = [task.state.joint("case", "drawer")[0] for task in (env, plain)]
+    assert opened[0] == pytest.approx(1.5 * opened[1], rel=1e-6)
+    half = Object("drawer", scale=0.5, joints={"drawer": 0.16})  # m, of the usual one
+    assert half.fitted(Fit(scale=2.0)).scale == 1.0
+    with pytest.raises(UnknownNameError, match="case.drawer"):
+        tasks.make(ID, randomization=Randomization(size={"case.drawer": Fixed(1.5)}))
 
 
 @pytest.mark.parametrize(
