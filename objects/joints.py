@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from math import hypot
 from typing import Annotated, Literal
 
-from msgspec import Meta
-
 from objects.shapes import Coordinate, Place, Shape, scaled
 from robot_layouts.core.bounds import checked_number
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
@@ -16,7 +14,6 @@ from robot_layouts.core.schema import check_fields, within
 
 Coefficient = Annotated[float, within(0.0, 1e6)]
 Position = Annotated[float, within(-1e3, 1e3)]
-_NAME = Meta(pattern=r"^[A-Za-z][A-Za-z0-9_]*\Z", description="a letter, then letters, digits, _")
 _UNIT = 1e-6  # of the length of an axis
 
 
@@ -43,7 +40,7 @@ class Joint:
         carrier: Joint whose part carries this one; None if the thing's body does.
     """
 
-    name: Annotated[str, _NAME]
+    name: str
     kind: Literal["slide", "turn"]
     parts: tuple[Shape, ...]
     axis: tuple[Coordinate, Coordinate, Coordinate]
@@ -64,6 +61,10 @@ class Joint:
             DescriptorError: If a value is of a wrong type or out of bounds.
         """
         check_fields(self, DescriptorError)
+        if not self.name.isidentifier():
+            raise DescriptorError(
+                f"joint name {self.name!r} must be a letter followed by letters, digits and _"
+            )
         if abs(hypot(*self.axis) - 1) > _UNIT:
             raise DescriptorError(f"joint {self.name}: axis {self.axis} must be of length 1")
         if not self.lower < self.upper:

@@ -57,7 +57,7 @@ def handle(middle: Axis, along: Axis, out: Axis, length: float, part: str) -> Ma
     _, *arms = loop(middle, along, out, STANDOFF, length, BAR, STEEL)
     x, y, z = (a + STANDOFF * b for a, b in zip(middle, out, strict=True))
     ends = [np.add((x, y, z), np.multiply(along, side * length / 2)) for side in (-1, 1)]
-    held = rod(*ends, BAR / 2, STEEL)
+    held = rod(ends[0], ends[1], BAR / 2, STEEL)
     return Made([held, *arms], grips((x, y, z), along, out, BAR, part, offsets=ALONG, tilts=LEAN))
 
 

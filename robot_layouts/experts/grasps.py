@@ -278,6 +278,7 @@ def move_joint(
         steps: Number of waypoints, which are evenly apart.
         most: How many control steps each may take.
     """
+
     def then(scene: Scene, left: int) -> list[Pose]:
         now = scene.joints(body)[joint]
         return [moved_along(scene, body, joint, now + (to - now) / left, scene.tcp(robot))]
