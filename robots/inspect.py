@@ -124,8 +124,8 @@ def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, s
     file = next(
         file for file in package.needed(urdf.file, pictures=False) if file.path == urdf.file
     )
-    if store.state(file).usable:
-        return store.path(file), f"{store.path(file)} ({store.state(file).value})"
+    if store.state(file) is FileState.VERIFIED:
+        return store.path(file), f"{store.path(file)} ({FileState.VERIFIED.value})"
     try:
         path = find_package(package.origin.distribution) / package.origin.folder / urdf.file
     except SourceError:

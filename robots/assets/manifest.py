@@ -16,7 +16,6 @@ from robot_layouts.core.files import read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
 
 LARGEST_FILE = 2**28  # bytes
-LARGEST_TRUSTED_FILE = 2**26  # bytes; of one whose size the manifest does not promise
 _LARGEST_MANIFEST = 2**24  # bytes
 
 
@@ -70,14 +69,6 @@ class AssetFile:
     sha256: str
     physics: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
-
-    def limit(self, *, trust: bool) -> int:
-        """Return the most bytes that are read of what a source gives for it.
-
-        Args:
-            trust: Whether it may differ from what the manifest promises.
-        """
-        return max(self.bytes, LARGEST_TRUSTED_FILE) if trust else self.bytes
 
     def __str__(self) -> str:
         """Return package and path."""

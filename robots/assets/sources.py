@@ -10,7 +10,7 @@ import sys
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from importlib.util import find_spec
 from json import JSONDecodeError
@@ -87,10 +87,9 @@ class LocalCopy:
 
     name = "local"
 
-    def __init__(self, root: Path, *, states: Iterable[FileState] = (FileState.VERIFIED,)) -> None:
-        """Read from a folder, taking only files in some states."""
+    def __init__(self, root: Path) -> None:
+        """Read from a folder, taking only files that are what the manifest says."""
         self._store = AssetStore(root)
-        self._states = frozenset(states)
         self.title = f"local copy {root}"
 
     def holds(self, file: AssetFile) -> bool:
@@ -103,7 +102,7 @@ class LocalCopy:
         for file in files:
             try:
                 state = self._store.state(file)
-                if state in self._states:
+                if state is FileState.VERIFIED:
                     yield file, _read(file, self._store.path(file))
                 else:
                     absent.append(f"{file} ({state.value})")
@@ -278,7 +277,7 @@ def _read(file: AssetFile, path: Path) -> bytes:
         UnreadableFileError: If it cannot be read, or is not a regular file.
     """
     with open_regular(path) as stream:
-        return stream.read(file.limit(trust=True) + 1)
+        return stream.read(file.bytes + 1)
 
 
 def _read_cached(file: AssetFile, path: Path) -> bytes:
@@ -344,7 +343,7 @@ def _unpack(wheel: Path, wanted: Sequence[AssetFile], beside: Sequence[AssetFile
 def _unpacked(archive: zipfile.ZipFile, member: str, file: AssetFile) -> bytes:
     try:
         with archive.open(member) as stream:  # which may be larger than the archive claims
-            return stream.read(file.limit(trust=True) + 1)
+            return stream.read(file.bytes + 1)
     except _BAD_ARCHIVE as error:
         raise SourceError(f"the wheel's {member} is damaged: {error}") from error
 
