@@ -134,7 +134,7 @@ class Layout(Arrangement):
 
         Args:
             path: Where to save; must end in ``.dmd.yaml``.
-            visuals: Whether to include what the robots look like.
+            visuals: See `to_mjcf`.
 
         Returns:
             The path of the directives.
@@ -142,7 +142,8 @@ class Layout(Arrangement):
         Raises:
             LayoutError: If the path ends otherwise.
             AssetError: If a robot's files cannot be found or are invalid.
-            MissingPackageError: If trimesh is not installed.
+            DescriptorError: If a descriptor contradicts its URDF.
+            MissingPackageError: If trimesh or scipy is not installed.
         """
         from layouts.export import write_drake
 

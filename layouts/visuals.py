@@ -16,8 +16,8 @@ from robots import AssetError, MissingPackageError
 from robots.urdf.mesh_files import expect_near, load_scene
 from robots.urdf.model import UrdfShape
 from robots.urdf.paths import resolve
-from robots.urdf.reading import read_model
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.reading import model_of
+from robots.urdf.summary import root_of
 from robots.urdf.text import numbers_of
 
 Rgba = tuple[float, float, float, float]  # 0 … 1
@@ -56,8 +56,7 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Visual, ...]]:
         MissingPackageError: If trimesh is not installed.
     """
     require_trimesh("drawing a robot")
-    contents = read_urdf(urdf)
-    root, model = parse_urdf(contents, str(urdf)), read_model(contents, str(urdf))
+    root, model = root_of(urdf), model_of(urdf)
     colours = dict(_named_colours(root, urdf))
     drawn: dict[str, tuple[Visual, ...]] = {}
     for link in root.iterfind("link"):

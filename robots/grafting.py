@@ -38,8 +38,7 @@ from robots.descriptor import (
 from robots.mjcf.locator import local_source
 from robots.named import named_robot
 from robots.urdf.model import ModelJoint, UrdfModel
-from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.reading import model_of
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
@@ -301,8 +300,7 @@ def _robot(given: RobotLike) -> RobotDescriptor:
 
 
 def _model(source: UrdfSource) -> UrdfModel:
-    path = source.locate()
-    return read_model(read_urdf(path), path.as_posix())
+    return model_of(source.locate())
 
 
 def _gripper_joints(robot: RobotDescriptor) -> frozenset[str]:

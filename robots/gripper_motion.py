@@ -21,8 +21,7 @@ from robot_layouts.kinematics.tree import Tree
 from robots.action_split import JointGroup, is_gripper
 from robots.descriptor import RobotDescriptor
 from robots.urdf.model import UrdfModel
-from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.reading import model_of
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
@@ -264,8 +263,7 @@ def tips(tree: Tree, robot: RobotDescriptor, qpos: Floats) -> Floats:
 
 
 def _model(robot: RobotDescriptor) -> UrdfModel:
-    urdf = robot.urdf.locate()
-    return read_model(read_urdf(urdf), urdf.as_posix())
+    return model_of(robot.urdf.locate())
 
 
 def _poses(tree: Tree, qpos: Floats) -> Floats:

@@ -22,8 +22,8 @@ from robots.mjcf.locator import LocalMjcf
 from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
-from robots.urdf.reading import read_model
-from robots.urdf.summary import read_cleaned, read_urdf
+from robots.urdf.reading import model_of
+from robots.urdf.summary import read_cleaned
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
@@ -145,7 +145,7 @@ def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
         joint: name for name, group in robot.action_split.groups.items() for joint in group.joints
     }
     rows = [("joint", "type", "limits", "effort", "speed", "driven by")]
-    for joint in read_model(read_urdf(urdf), urdf.name).moving:
+    for joint in model_of(urdf).moving:
         driven = groups.get(joint.name, "nothing")
         mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
         rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
@@ -205,7 +205,7 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
     """Return where the TCP is at each keyframe, in the base frame (m)."""
-    model = read_model(read_urdf(urdf), urdf.name)
+    model = model_of(urdf)
     others = [joint.name for joint in model.moving if joint.name not in robot.joints]
     tree = kinematic_tree(model, [*robot.joints, *others])
     qpos = np.zeros((len(robot.keyframes), len(tree.coordinates)))

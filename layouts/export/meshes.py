@@ -118,18 +118,26 @@ def _hull(shape: UrdfShape, source: RobotSource) -> Any:
 
 
 class MeshFolder:
-    """A folder of binary STL files, whose names lead to no other folder."""
+    """A folder of binary STL or of Wavefront files, whose names lead to no other folder."""
 
-    def __init__(self, folder: Path) -> None:
-        """Make it if need be."""
+    def __init__(self, folder: Path, ending: str = ".stl") -> None:
+        """Make it if need be; the ending of its files chooses the format."""
         folder.mkdir(parents=True, exist_ok=True)
-        self._folder, self._names = folder, Names()
+        self._folder, self._ending, self._names = folder, ending, Names()
 
     def save(self, mesh: Any, name: str) -> str:
         """Write a trimesh under a name like the one given, and return the file's name."""
-        file = f"{self._names.new(name)}.stl"
-        save_stl(mesh.vertices, mesh.faces, self._folder / file)
+        file = f"{self._names.new(name)}{self._ending}"
+        save = save_stl if self._ending == ".stl" else _save_obj
+        save(mesh.vertices, mesh.faces, self._folder / file)
         return file
+
+
+def _save_obj(vertices: Floats, faces: Any, path: Path) -> None:
+    import trimesh
+
+    bare = trimesh.Trimesh(vertices, faces, process=False)
+    bare.export(path, include_normals=False, include_texture=False, include_color=False)
 
 
 def save_stl(vertices: Floats, faces: Any, path: Path) -> None:

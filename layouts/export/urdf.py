@@ -15,9 +15,9 @@ from robots.assets.assembled import rename
 from robots.bodies.allowed import joined_pairs, read_allowed_pairs
 from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
-from robots.urdf.reading import read_model
+from robots.urdf.reading import model_of
 from robots.urdf.srdf import srdf_beside
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.summary import root_of
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
@@ -55,15 +55,10 @@ def write_urdf(
     return target
 
 
-def base_link(file: Path) -> str:
-    """Return the name of the link of a URDF that hangs on no joint."""
-    return read_model(read_urdf(file), str(file)).root
-
-
 def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
     joint = Element("joint", name=f"{place}/base", type="fixed")
     SubElement(joint, "parent", link=WORLD)
-    SubElement(joint, "child", link=f"{place}/{base_link(file)}")
+    SubElement(joint, "child", link=f"{place}/{model_of(file).root}")
     turn = quaternion_rpy(placement.base_quaternion)
     SubElement(joint, "origin", xyz=_text(placement.base_position), rpy=_text(turn))
     return joint
@@ -71,7 +66,7 @@ def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
 
 def _renamed(file: Path, place: str, folder: Path | None, *, visuals: bool) -> Iterator[Element]:
     """Yield the elements of a robot with names behind its place, and files by their paths."""
-    for element in parse_urdf(read_urdf(file), str(file)):
+    for element in root_of(file):
         if element.tag not in COPIED:
             continue
         for visual in [] if visuals else element.findall("visual"):
@@ -93,12 +88,12 @@ def _disabled_pairs(robot: RobotDescriptor, file: Path, place: str) -> Iterator[
     """
     pairs: list[Element] = []
     if robot.allowed_collisions is not None:
-        model = read_model(read_urdf(file), str(file))
+        model = model_of(file)
         apart = read_allowed_pairs(robot, model, file) - joined_pairs(model)
         for one, other in sorted(sorted(p) for p in apart if p <= model.collisions.keys()):
             pairs.append(Element("disable_collisions", link1=one, link2=other, reason="Default"))
     elif (srdf := srdf_beside(file)) is not None:
-        pairs.extend(parse_urdf(read_urdf(srdf), str(srdf)).iterfind("disable_collisions"))
+        pairs.extend(root_of(srdf).iterfind("disable_collisions"))
     for pair in pairs:
         for key in ("link1", "link2"):
             pair.set(key, f"{place}/{pair.get(key)}")

@@ -18,8 +18,8 @@ from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots.descriptor import IDENTITY, Quaternion, UrdfSource, Vector3
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
-from robots.urdf.reading import read_model
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.reading import model_of
+from robots.urdf.summary import root_of
 
 URDF = "assembled.urdf"
 
@@ -104,13 +104,12 @@ class _Assembly:
     ) -> str:
         """Take a URDF over, or what one link of it carries, and return the new name of its root."""
         path = source.locate(pictures=self._pictures)
-        contents = read_urdf(path)
-        model = read_model(contents, path.as_posix())
+        model = model_of(path)
         root = root or model.root
         wanted = carried_by(model, [root]) - carried_by(model, without)
         if root not in wanted:
             raise DescriptorError(f"nothing is left without {root!r}, which carries the rest")
-        for element in parse_urdf(contents, path.as_posix()):
+        for element in root_of(path):
             if not _belongs(element, wanted, root):
                 continue
             for visual in [] if self._pictures else element.findall("visual"):

@@ -21,9 +21,8 @@ from robots.urdf.cleaning.xacro_files import template_of
 from robots.urdf.mesh_files import has_volume, read_corners
 from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
-from robots.urdf.reading import read_model
+from robots.urdf.reading import model_of
 from robots.urdf.srdf import srdf_beside
-from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
@@ -135,7 +134,7 @@ def _modified(file: Path) -> int:
 
 @lru_cache(maxsize=64)
 def _load(robot: RobotDescriptor, urdf: Path, _stamps: tuple[int, ...]) -> RobotModel:
-    model = read_model(read_urdf(urdf), str(urdf))
+    model = model_of(urdf)
     kinematics, hulls = kinematic_tree(model, robot.joints), read_hulls(model, urdf)
     allowed = read_allowed_pairs(robot, model, urdf)
     return RobotModel(kinematics, hulls, counted_pairs(kinematics, hulls, allowed))
