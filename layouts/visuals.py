@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats
-from robots import AssetError, MissingPackageError
+from robots import AssetError
 from robots.urdf.mesh_files import expect_near, load_scene
 from robots.urdf.model import UrdfShape
 from robots.urdf.paths import resolve
@@ -53,9 +53,7 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Visual, ...]]:
     Raises:
         AssetError: If a mesh is missing or cannot be read or is as large as no robot, or a shape
             is unknown.
-        MissingPackageError: If trimesh is not installed.
     """
-    require_trimesh("drawing a robot")
     root, model = root_of(urdf), model_of(urdf)
     colours = dict(_named_colours(root, urdf))
     drawn: dict[str, tuple[Visual, ...]] = {}
@@ -69,20 +67,6 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Visual, ...]]:
         if parts:
             drawn[link.get("name", "")] = parts
     return drawn
-
-
-def require_trimesh(what: str) -> None:
-    """Say which command installs trimesh.
-
-    Raises:
-        MissingPackageError: If it is not installed.
-    """
-    try:
-        import trimesh  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError as error:
-        raise MissingPackageError(
-            f"{what} needs trimesh: pip install 'robot-layouts[view]'"
-        ) from error
 
 
 def coloured(mesh: Any, rgba: Rgba) -> Visual:

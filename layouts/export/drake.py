@@ -13,13 +13,12 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 import yaml
 
 from layouts.export.cell import ExportedCell, RobotSource, Standing
-from layouts.export.files import replaced_folder
+from layouts.export.files import expect_ending, replaced_folder
 from layouts.export.meshes import MeshFolder, drawn_meshes
 from layouts.export.urdf import COPIED
-from layouts.visuals import load_meshes, require_trimesh
+from layouts.visuals import load_meshes
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.quaternions import quaternion_rpy
-from robots import LayoutError
 from robots.urdf.paths import resolve
 
 if TYPE_CHECKING:
@@ -31,14 +30,9 @@ WORLD = "world"  # as Drake calls what everything stands in
 
 def write_drake(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
     """Write a layout as Drake's model directives; see `layouts.Layout.to_drake`."""
-    target = Path(path)
-    if not target.name.endswith(ENDING):
-        raise LayoutError(
-            f"cannot save model directives as {target.name!r}; the name must end in {ENDING}"
-        )
-    require_trimesh("meshes that Drake can read")
+    target = expect_ending(path, "model directives", ENDING)
     cell = ExportedCell.read(layout, visuals=visuals)
-    folder = target.absolute().with_name(target.name.removesuffix(ENDING) + "_robots")
+    folder = target.absolute().with_name(target.name[: -len(ENDING)] + "_robots")
     with replaced_folder(folder, _is_own, "save the directives under another name") as made:
         bases = {
             source.name: _write_model(source, made / source.name, visuals=visuals)

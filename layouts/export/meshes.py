@@ -12,8 +12,9 @@ import numpy as np
 from layouts.export.cell import RobotSource
 from layouts.export.files import Names
 from layouts.visuals import GREY, Rgba, read_visuals, simplified
+from robot_layouts.core.importing import optional
 from robot_layouts.kinematics.rotations import Floats
-from robots import AssetError, MissingPackageError
+from robots import AssetError
 from robots.bodies.hulls import shape_corners
 from robots.urdf.model import SIZES, UrdfShape
 
@@ -91,7 +92,7 @@ def solid_shapes(
 
     Raises:
         AssetError: If a mesh is missing or cannot be read, or a shape has no volume.
-        MissingPackageError: If trimesh or scipy is not installed.
+        MissingPackageError: If scipy is not installed.
     """
     return {
         link: tuple(
@@ -103,14 +104,10 @@ def solid_shapes(
 
 
 def _hull(shape: UrdfShape, source: RobotSource) -> Any:
+    import trimesh
+
     corners = shape_corners(shape, source.urdf)
-    try:
-        import scipy  # noqa: F401  # pyright: ignore[reportUnusedImport]
-        import trimesh
-    except ImportError as error:
-        raise MissingPackageError(
-            "convex hulls need trimesh and scipy: pip install 'robot-layouts[checks]'"
-        ) from error
+    optional("scipy", "convex hulls need scipy", "checks")
     try:
         return trimesh.convex.convex_hull(corners)
     except Exception as error:  # qhull's own, for what is all but flat

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
+from layouts.export.files import expect_ending
 from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import quaternion_rpy
-from robots import LayoutError, RobotDescriptor
+from robots import RobotDescriptor
 from robots.assets.assembled import rename
 from robots.bodies.allowed import joined_pairs, read_allowed_pairs
 from robots.descriptor import Vector3
@@ -35,9 +36,7 @@ def write_urdf(
     visuals: bool = True,
 ) -> Path:
     """Write a layout as one URDF; see `layouts.Layout.to_urdf`."""
-    target = Path(path)
-    if target.suffix.lower() != ".urdf":
-        raise LayoutError(f"cannot save a URDF as {target.name!r}; the name must end in .urdf")
+    target = expect_ending(path, "a URDF", ".urdf")
     folder = target.absolute().parent if relative else None
     urdf, semantics = Element("robot", name=target.stem), Element("robot", name=target.stem)
     SubElement(urdf, "link", name=WORLD)

@@ -13,7 +13,8 @@ from contextlib import contextmanager, redirect_stdout
 from typing import Any, NamedTuple
 
 from layouts.viewer.guard import MESSAGE_BYTES, Guard, fits
-from robots import MissingPackageError, RobotLayoutsError
+from robot_layouts.core.importing import optional
+from robots import RobotLayoutsError
 
 LAST_PORT = 65535
 REST = 0.002  # s between two messages of a browser, which sends 120 in a second of dragging
@@ -80,13 +81,7 @@ def import_viser() -> Any:
     Raises:
         MissingPackageError: If it is not installed.
     """
-    try:
-        import viser
-    except ImportError as error:
-        raise MissingPackageError(
-            "a page needs viser: pip install 'robot-layouts[view]'"
-        ) from error
-    return viser
+    return optional("viser", "a page needs viser", "view")
 
 
 @contextmanager

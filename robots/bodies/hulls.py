@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from robot_layouts.core.errors import AssetError, MissingPackageError
+from robot_layouts.core.errors import AssetError
+from robot_layouts.core.importing import optional
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.kinematics.tree import Tree
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
@@ -86,12 +87,7 @@ def require_packages() -> None:
     Raises:
         MissingPackageError: If python-fcl is not installed.
     """
-    try:
-        import fcl  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError as error:
-        raise MissingPackageError(
-            "checking a layout needs python-fcl: pip install 'robot-layouts[checks]'"
-        ) from error
+    optional("fcl", "checking a layout needs python-fcl", "checks")
 
 
 def read_hulls(model: UrdfModel, urdf: Path) -> tuple[Hull, ...]:
