@@ -13,6 +13,7 @@ import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats
 from robots import AssetError
+from robots.bodies.hulls import primitive
 from robots.urdf.mesh_files import expect_near, load_scene
 from robots.urdf.model import UrdfShape
 from robots.urdf.paths import resolve
@@ -155,24 +156,9 @@ def _visual_parts(shape: UrdfShape, rgba: Rgba | None, urdf: Path) -> Iterator[V
     if shape.kind == "mesh":
         yield from _mesh_parts(shape, urdf, shape.origin @ np.diag([*shape.sizes, 1.0]), rgba)
         return
-    mesh = _primitive(shape)
+    mesh = primitive(shape, SIDES)
     mesh.apply_transform(shape.origin)
     yield coloured(mesh, rgba or GREY)
-
-
-def _primitive(shape: UrdfShape) -> Any:
-    import trimesh
-
-    match shape.kind:
-        case "box":
-            return trimesh.creation.box(shape.sizes)
-        case "sphere":
-            return trimesh.creation.icosphere(subdivisions=3, radius=shape.sizes[0])
-        case "cylinder":
-            return trimesh.creation.cylinder(*shape.sizes, sections=SIDES)
-        case _:
-            radius, length = shape.sizes
-            return trimesh.creation.capsule(length, radius, count=[SIDES, SIDES])
 
 
 def _mesh_parts(shape: UrdfShape, urdf: Path, pose: Floats, rgba: Rgba | None) -> Iterator[Visual]:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar, NoReturn, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robot_layouts.core.schema import check_fields
@@ -17,6 +17,7 @@ from robots.parts import (
     IDENTITY,
     CameraMount,
     Fingers,
+    Frozen,
     GripperMaterial,
     Home,
     Limb,
@@ -222,12 +223,12 @@ class RobotDescriptor:
                 f"{self.name}: keyframe {key!r} has {len(qpos)} numbers;"
                 f" the robot has {self.dof} joints ({', '.join(self.joints)})",
             )
-        object.__setattr__(self, "keyframes", _Frozen(frozen))
+        object.__setattr__(self, "keyframes", Frozen(frozen))
         self.keyframe(self.home.keyframe)
-        object.__setattr__(self, "limbs", _Frozen(self.limbs))
+        object.__setattr__(self, "limbs", Frozen(self.limbs))
         self._owners()
-        modes = {mode: _Frozen(groups) for mode, groups in self.control_modes.items()}
-        object.__setattr__(self, "control_modes", _Frozen(modes))
+        modes = {mode: Frozen(groups) for mode, groups in self.control_modes.items()}
+        object.__setattr__(self, "control_modes", Frozen(modes))
         self._check_modes()
 
     @property
@@ -466,19 +467,3 @@ class RobotDescriptor:
                     )
                 )
         return tuple(numbers)
-
-
-class _Frozen(dict[str, Any]):
-    """A dict that hashes by its items and refuses to change (and still pickles)."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(tuple(self.items()))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return (_Frozen, (dict(self),))
-
-    def _refuse(self, *_: object, **__: object) -> NoReturn:
-        raise TypeError("a descriptor is frozen; use dataclasses.replace to change it")
-
-    __setitem__ = __delitem__ = __ior__ = pop = clear = popitem = _refuse
-    update = setdefault = _refuse  # pyright: ignore[reportAssignmentType]

@@ -11,6 +11,7 @@ import numpy as np
 from robot_layouts.core.cli import Word, main_of
 from robot_layouts.core.commands import print_error, start
 from robot_layouts.core.paths import default_root
+from robot_layouts.core.quoting import columns
 from robots.assets.locator import LocalUrdf, UrdfLocator
 from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
@@ -51,17 +52,10 @@ def list_robots() -> int:
     robots, failures = RobotRegistry.load_all()
     rows = [("robot", "joints", "action", "reach (m)", "numbers from")]
     rows += [(r.name, str(r.dof), str(r.action_dim), f"{r.reach:g}", r.source) for r in robots]
-    print("\n".join(_table(rows)))
+    print("\n".join(columns(rows)))
     for failure in failures:
         print_error(failure)
     return 1 if failures else 0
-
-
-def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """Yield a line for each row, with columns of equal width."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
 
 
 def report(robot: RobotDescriptor, store: AssetStore) -> str:
@@ -149,7 +143,7 @@ def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
         driven = groups.get(joint.name, "nothing")
         mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
         rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
-    return _table(rows)
+    return columns(rows)
 
 
 def _limits(joint: ModelJoint) -> str:
@@ -166,7 +160,7 @@ def _bounds(joint: ModelJoint) -> tuple[str, str]:
     )
 
 
-def _drives(robot: RobotDescriptor) -> Iterator[str]:
+def _drives(robot: RobotDescriptor) -> Iterable[str]:
     rows = [("group", "joints", "stiffness", "damping", "force limit", "friction", "armature")]
     for name, group in robot.action_split.groups.items():
         force, per = ("N", "N/m") if group.unit == "m" else ("N·m", "N·m/rad")
@@ -181,7 +175,7 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
                 f"{_numbers(group.armature)} {'kg' if group.unit == 'm' else 'kg·m²'}",
             )
         )
-    return _table(rows)
+    return columns(rows)
 
 
 def _how_driven(group: JointGroup) -> str:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import combinations, groupby
+from typing import Any, NoReturn
 
 from robot_layouts.core.bounds import expect_unit
 from robot_layouts.core.errors import DescriptorError
@@ -23,6 +24,24 @@ _Owners = dict[str, str | None]
 
 BODY = "body"  # what takes action numbers and is no limb: a torso that turns, a base that drives
 LARGEST_IMAGE = 16384  # pixels; what graphics drivers allow
+
+
+class Frozen(dict[str, Any]):
+    """A dict that hashes by its items and refuses to change (and still pickles)."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        """Hash the items in their order."""
+        return hash(tuple(self.items()))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by the items."""
+        return (Frozen, (dict(self),))
+
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
+        raise TypeError("a descriptor is frozen; use dataclasses.replace to change it")
+
+    __setitem__ = __delitem__ = __ior__ = pop = clear = popitem = _refuse
+    update = setdefault = _refuse  # pyright: ignore[reportAssignmentType]
 
 
 @dataclass(frozen=True)

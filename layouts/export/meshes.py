@@ -13,9 +13,9 @@ from layouts.export.cell import RobotSource
 from layouts.export.files import Names
 from layouts.visuals import GREY, Rgba, read_visuals, simplified
 from robot_layouts.core.importing import optional
-from robot_layouts.kinematics.rotations import Floats
 from robots import AssetError
 from robots.bodies.hulls import shape_corners
+from robots.urdf.mesh_files import binary_stl
 from robots.urdf.model import SIZES, UrdfShape
 
 AS_HULLS = ("mesh", "capsule")  # of which most formats' own shapes are not what they are here
@@ -123,35 +123,19 @@ class MeshFolder:
         self._folder, self._ending, self._names = folder, ending, Names()
 
     def save(self, mesh: Any, name: str) -> str:
-        """Write a trimesh under a name like the one given, and return the file's name."""
+        """Write a trimesh under a name like the one given, and return the file's name.
+
+        Triangles without an area are left out of an STL.
+        """
         file = f"{self._names.new(name)}{self._ending}"
-        save = save_stl if self._ending == ".stl" else _save_obj
-        save(mesh.vertices, mesh.faces, self._folder / file)
+        if self._ending == ".stl":
+            corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces, int)]  # (n, 3, 3)
+            flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            (self._folder / file).write_bytes(binary_stl(corners[flat.any(axis=1)]))
+            return file
+        import trimesh
+
+        bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        path = self._folder / file
+        bare.export(path, include_normals=False, include_texture=False, include_color=False)
         return file
-
-
-def _save_obj(vertices: Floats, faces: Any, path: Path) -> None:
-    import trimesh
-
-    bare = trimesh.Trimesh(vertices, faces, process=False)
-    bare.export(path, include_normals=False, include_texture=False, include_color=False)
-
-
-def save_stl(vertices: Floats, faces: Any, path: Path) -> None:
-    """Write a mesh as binary STL; triangles without an area are left out.
-
-    Args:
-        vertices: (n, 3) (m).
-        faces: Indices of three corners each, (m, 3).
-        path: The file.
-    """
-    corners = np.asarray(vertices, float)[np.asarray(faces, int)]  # (m, 3, 3)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    kept = lengths > 0
-    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
-    triangles = np.zeros(int(kept.sum()), kind)
-    triangles["normal"] = normals[kept] / lengths[kept, None]
-    triangles["corners"] = corners[kept]
-    header = b"binary STL".ljust(80) + np.uint32(len(triangles)).tobytes()
-    path.write_bytes(header + triangles.tobytes())

@@ -161,22 +161,31 @@ def shape_corners(shape: UrdfShape, urdf: Path) -> Floats:
 
 def _corners(shape: UrdfShape, urdf: Path) -> Floats:
     """Return the corners of a collision shape in its own frame, (n, 3) (m)."""
+    if shape.kind == "mesh":
+        path = resolve(shape.file, urdf.as_posix(), os.path.isfile)
+        return read_corners(path, shape.sizes, shape.where, urdf.as_posix())
+    return np.asarray(primitive(shape, SIDES).vertices, float)
+
+
+def primitive(shape: UrdfShape, sides: int) -> Any:
+    """Return a shape that is no mesh as a trimesh, in its own frame (m).
+
+    Args:
+        shape: The shape.
+        sides: Of the polygon that stands for a circle.
+    """
     import trimesh
 
     match shape.kind:
-        case "mesh":
-            path = resolve(shape.file, urdf.as_posix(), os.path.isfile)
-            return read_corners(path, shape.sizes, shape.where, urdf.as_posix())
         case "box":
-            made = trimesh.creation.box(shape.sizes)
+            return trimesh.creation.box(shape.sizes)
         case "sphere":
-            made = trimesh.creation.icosphere(subdivisions=3, radius=shape.sizes[0])
+            return trimesh.creation.icosphere(subdivisions=3, radius=shape.sizes[0])
         case "cylinder":
-            made = trimesh.creation.cylinder(*shape.sizes, sections=SIDES)
+            return trimesh.creation.cylinder(*shape.sizes, sections=sides)
         case _:
             radius, length = shape.sizes
-            made = trimesh.creation.capsule(length, radius, count=[SIDES, SIDES])
-    return np.asarray(made.vertices, float)
+            return trimesh.creation.capsule(length, radius, count=[sides, sides])
 
 
 def convex_hull(link: int, corners: Floats, where: str) -> Hull:

@@ -9,7 +9,6 @@ body, become frames.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -28,13 +27,13 @@ from robots.guessing import words
 from robots.mjcf.couplings import Couplings
 from robots.mjcf.reading import Model, name_of
 from robots.mjcf.robot import SLIDE, MjcfRobot, take_name
+from robots.urdf.mesh_files import binary_stl
 
 FARTHEST = 10.0  # m; how far a slide goes each way whose range nothing says
 TOOLS = (*words.TCP, *words.GRASP, *words.TOOL, *words.END, *words.HAND, *words.TIP, *words.FLANGE)
 WORLD = "world"
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJoCo's kinds
 SEEN_GROUPS = 3  # the first groups of shapes, which MuJoCo draws unless it is asked otherwise
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 @dataclass
@@ -308,7 +307,7 @@ def _ellipsoid(x: float, y: float, z: float) -> tuple[str, bytes]:
 
     ball = trimesh.creation.icosphere(subdivisions=2)
     corners = np.asarray(ball.vertices) * (x, y, z)
-    return f"ellipsoid_{x:g}_{y:g}_{z:g}.stl", _stl(corners[ball.faces])
+    return f"ellipsoid_{x:g}_{y:g}_{z:g}.stl", binary_stl(corners[ball.faces])
 
 
 def _mesh(model: Model, geom: int) -> tuple[str, bytes]:
@@ -318,18 +317,7 @@ def _mesh(model: Model, geom: int) -> tuple[str, bytes]:
     first = int(model.mesh_faceadr[mesh])
     faces = model.mesh_face[first : first + int(model.mesh_facenum[mesh])]
     given = "".join(c if c.isalnum() and c.isascii() else "_" for c in name_of(model, "mesh", mesh))
-    return f"{mesh}_{given[:60]}.stl", _stl(np.asarray(model.mesh_vert[vertices])[faces])
-
-
-def _stl(triangles: Floats) -> bytes:
-    """Return a binary STL of triangles, (n, 3, 3) (m)."""
-    records = np.zeros(len(triangles), _RECORD)
-    records["corners"] = triangles
-    one, other = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    normals = np.cross(one, other)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    records["normal"] = normals / np.where(lengths > 0, lengths, 1.0)
-    return bytes(80) + struct.pack("<I", len(triangles)) + records.tobytes()
+    return f"{mesh}_{given[:60]}.stl", binary_stl(np.asarray(model.mesh_vert[vertices])[faces])
 
 
 def _rgba(model: Model, geom: int) -> Floats:
