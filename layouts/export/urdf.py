@@ -10,19 +10,17 @@ from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
 from layouts.export.files import expect_ending
 from robot_layouts.core.writing import written_whole
-from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots import RobotDescriptor
 from robots.assets.assembled import rename
 from robots.bodies.allowed import joined_pairs, read_allowed_pairs
-from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
 from robots.urdf.reading import model_of
 from robots.urdf.srdf import srdf_beside
 from robots.urdf.summary import root_of
+from robots.urdf.writing import joint_element, origin_at
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
-    from layouts.placement import Placement
 
 WORLD = "world"
 COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
@@ -42,7 +40,9 @@ def write_urdf(
     SubElement(urdf, "link", name=WORLD)
     for place, placement in layout.items():
         file = placement.robot.urdf.locate(pictures=visuals)
-        urdf.append(_fixed_to_world(place, placement, file))
+        root = f"{place}/{model_of(file).root}"
+        origin = origin_at(placement.base_position, placement.base_quaternion)
+        urdf.append(joint_element(f"{place}/base", "fixed", WORLD, root, origin))
         urdf.extend(_renamed(file, place, folder, visuals=visuals))
         semantics.extend(_disabled_pairs(placement.robot, file, place))
     _write(urdf, target)
@@ -52,15 +52,6 @@ def write_urdf(
     else:
         beside.unlink(missing_ok=True)
     return target
-
-
-def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
-    joint = Element("joint", name=f"{place}/base", type="fixed")
-    SubElement(joint, "parent", link=WORLD)
-    SubElement(joint, "child", link=f"{place}/{model_of(file).root}")
-    turn = quaternion_rpy(placement.base_quaternion)
-    SubElement(joint, "origin", xyz=_text(placement.base_position), rpy=_text(turn))
-    return joint
 
 
 def _renamed(file: Path, place: str, folder: Path | None, *, visuals: bool) -> Iterator[Element]:
@@ -103,7 +94,3 @@ def _write(root: Element, target: Path) -> None:
     indent(root)
     with written_whole(target) as unfinished:
         ElementTree(root).write(unfinished, encoding="utf-8", xml_declaration=True)
-
-
-def _text(values: Vector3) -> str:
-    return " ".join(repr(value) for value in values)

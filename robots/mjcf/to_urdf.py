@@ -15,12 +15,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
     pose_matrix,
-    quaternion_of,
     rotation_about,
 )
 from robots.guessing import words
@@ -28,6 +26,7 @@ from robots.mjcf.couplings import Couplings
 from robots.mjcf.reading import Model, name_of
 from robots.mjcf.robot import SLIDE, MjcfRobot, take_name
 from robots.urdf.mesh_files import binary_stl
+from robots.urdf.writing import joint_element, origin_of, text
 
 FARTHEST = 10.0  # m; how far a slide goes each way whose range nothing says
 TOOLS = (*words.TCP, *words.GRASP, *words.TOOL, *words.END, *words.HAND, *words.TIP, *words.FLANGE)
@@ -125,7 +124,9 @@ class _Writer:
             elements.append(Element("link", name=carrier))
         if not joints:
             name = self._joint_name(f"{robot.links[body]}_fixed")
-            elements.append(_joint(name, "fixed", carrier, robot.links[body], start))
+            elements.append(
+                joint_element(name, "fixed", carrier, robot.links[body], origin_of(start))
+            )
             return elements, np.eye(4)
         before = np.zeros(3)  # where the frame of the link before is in the body's
         for joint in joints:
@@ -157,11 +158,11 @@ class _Writer:
         model, name = self._model, self._robot.names[joint]
         if joint in self._couplings.fixed:
             place = pose @ self._motion(joint, self._couplings.fixed[joint])
-            return _joint(name, "fixed", parent, child, place)
+            return joint_element(name, "fixed", parent, child, origin_of(place))
         slides = model.jnt_type[joint] == SLIDE
         limited = bool(model.jnt_limited[joint])
         kind = "prismatic" if slides else "revolute" if limited else "continuous"
-        element = _joint(name, kind, parent, child, pose)
+        element = joint_element(name, kind, parent, child, origin_of(pose))
         SubElement(element, "axis", xyz=text(*model.jnt_axis[joint]))
         numbers: dict[str, str] = {}
         if limited:
@@ -195,10 +196,10 @@ class _Writer:
                 link = self.free(name if name not in self._taken else f"{name}_site")
                 pose = pose_of(self._model.site_pos[site], self._model.site_quat[site])
                 place = self._inside[body] @ pose
-                joint = self._joint_name(f"{link}_fixed")
+                fixed = self._joint_name(f"{link}_fixed")
                 elements += [
                     Element("link", name=link),
-                    _joint(joint, "fixed", self._robot.links[body], link, place),
+                    joint_element(fixed, "fixed", self._robot.links[body], link, origin_of(place)),
                 ]
         return elements
 
@@ -207,14 +208,6 @@ class _Writer:
             name += "_"
         self._joints.add(name)
         return name
-
-
-def _joint(name: str, kind: str, parent: str, child: str, pose: Floats) -> Element:
-    joint = Element("joint", name=name, type=kind)
-    SubElement(joint, "parent", link=parent)
-    SubElement(joint, "child", link=child)
-    origin(joint, pose)
-    return joint
 
 
 def excluded(robot: MjcfRobot) -> tuple[tuple[str, str], ...]:
@@ -252,23 +245,15 @@ def add_shapes(
             continue
         for use in _uses(model, geom):
             shape = SubElement(link, use)
-            origin(shape, shift @ pose_of(model.geom_pos[geom], model.geom_quat[geom]))
+            SubElement(
+                shape,
+                "origin",
+                origin_of(shift @ pose_of(model.geom_pos[geom], model.geom_quat[geom])),
+            )
             _geometry(SubElement(shape, "geometry"), model, geom, meshes)
             if use == "visual":
                 _colour(shape, model, geom)
     return notes
-
-
-def origin(parent: Element, pose: Floats) -> None:
-    """Give an element the ``<origin>`` of a pose, (4, 4) (m)."""
-    w, x, y, z = quaternion_of(pose[:3, :3]).tolist()
-    px, py, pz = pose[:3, 3].tolist()
-    SubElement(parent, "origin", xyz=text(px, py, pz), rpy=text(*quaternion_rpy((w, x, y, z))))
-
-
-def text(*numbers: float) -> str:
-    """Return numbers as a URDF has them, to the last digit."""
-    return " ".join(repr(float(number)) for number in numbers)
 
 
 def pose_of(position: Floats, quaternion: Floats) -> Floats:
@@ -337,7 +322,9 @@ def inertial(link: Element, model: Model, body: int, shift: Floats) -> None:
     if mass <= 0:
         return
     element = SubElement(link, "inertial")
-    origin(element, shift @ pose_of(model.body_ipos[body], model.body_iquat[body]))
+    SubElement(
+        element, "origin", origin_of(shift @ pose_of(model.body_ipos[body], model.body_iquat[body]))
+    )
     SubElement(element, "mass", value=text(mass))
     xx, yy, zz = map(text, model.body_inertia[body])
     SubElement(element, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")
