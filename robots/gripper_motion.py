@@ -65,7 +65,7 @@ class GripperMotion:
         self.joints = tuple(joint for group in groups for joint in group.joints)
         places = [robot.joints.index(joint) for joint in self.joints]
         limits = tree.limits[places]
-        ends = np.concatenate([_ends(group, tree.limits, robot) for group in groups])
+        ends = np.concatenate([ends_of(group, tree.limits, robot) for group in groups])
         self._ends = np.clip(ends, limits[:, :1], limits[:, 1:])
         self._travels = self._ends[:, 1] - self._ends[:, 0]
         if not np.isfinite(self._ends).all() or not self._travels.any():
@@ -156,8 +156,14 @@ def gripper_motion(robot: RobotDescriptor) -> GripperMotion:
     return GripperMotion(robot)
 
 
-def _ends(group: JointGroup, limits: Floats, robot: RobotDescriptor) -> Floats:
-    """Return where each joint of a group is when closed and when open, (joints, 2) (rad, m)."""
+def ends_of(group: JointGroup, limits: Floats, robot: RobotDescriptor) -> Floats:
+    """Return where each joint of a gripper is when closed and when open, (joints, 2) (rad, m).
+
+    Args:
+        group: The gripper's.
+        limits: Of the robot's joints, in the descriptor's order, (dof, 2) (rad, m).
+        robot: The robot.
+    """
     own = limits[[robot.joints.index(joint) for joint in group.joints]]
     if group.delta or group.target or group.command != "position":
         return own
