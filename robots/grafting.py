@@ -25,7 +25,6 @@ from robots.bodies.overlaps import guess_allowed
 from robots.control_modes import CONTROL_MODES
 from robots.descriptor import (
     IDENTITY,
-    CameraMount,
     GripperMaterial,
     Home,
     Limb,
@@ -173,20 +172,6 @@ def with_tool(
         allowed_collisions=_allowed(urdf, [(robot, "")]),
     )
     return replace(made, reach=_reach(robot, made))
-
-
-def with_camera(robot: RobotDescriptor, camera: CameraMount) -> RobotDescriptor:
-    """Return a robot with one more camera.
-
-    Raises:
-        DescriptorError: If it has a camera of that name.
-        UnknownNameError: If it has no such link.
-        AssetError: If its files cannot be found.
-    """
-    links = _model(robot.urdf).links
-    if camera.link not in links:
-        raise UnknownNameError(f"link of {robot.name}", camera.link, links)
-    return replace(robot, cameras=(*robot.cameras, camera))
 
 
 def on_body(
