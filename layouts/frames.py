@@ -168,7 +168,7 @@ def rectangle(what: str, value: object) -> Rectangle:
     """Return an outline: x_min, y_min, x_max, y_max (m).
 
     Raises:
-        LayoutError: If it is none.
+        LayoutError: If it is not four numbers, or not in this order.
     """
     x_min, y_min, x_max, y_max = numbers(what, value, 4)
     if x_min >= x_max or y_min >= y_max:

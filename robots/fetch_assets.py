@@ -15,13 +15,7 @@ from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import INDEX_PACKAGES
 from robots.assets.progress import size
-from robots.assets.sources import (
-    AssetSource,
-    HubSource,
-    InstalledPackage,
-    LocalCopy,
-    PackageWheel,
-)
+from robots.assets.sources import AssetSource, HubSource, InstalledPackage, LocalCopy, PackageWheel
 from robots.assets.store import AssetStore, FileState
 from robots.descriptor import RobotDescriptor
 from robots.named import FORMS, named_robot

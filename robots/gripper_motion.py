@@ -11,12 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from robot_layouts.core.errors import DescriptorError
-from robot_layouts.kinematics.rotations import (
-    Floats,
-    inverse_pose,
-    quaternion_of,
-    transform,
-)
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
 from robot_layouts.kinematics.tree import Tree
 from robots.action_split import JointGroup, is_gripper
 from robots.descriptor import RobotDescriptor

@@ -15,12 +15,7 @@ from layouts.export.files import Names
 from layouts.frames import TABLE_DEPTH, table_outlines
 from layouts.placement import Placement
 from robot_layouts.core.commands import notice
-from robot_layouts.kinematics.rotations import (
-    Floats,
-    inverse_pose,
-    pose_matrix,
-    transform,
-)
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, transform
 from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel

@@ -15,12 +15,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from robot_layouts.kinematics.rotations import (
-    Floats,
-    inverse_pose,
-    pose_matrix,
-    rotation_about,
-)
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, rotation_about
 from robots.guessing import words
 from robots.mjcf.couplings import Couplings
 from robots.mjcf.reading import Model, name_of
