@@ -8,6 +8,7 @@ from benchmarks.conversions import conversions
 from benchmarks.experts import experts
 from benchmarks.gallery.pages import gallery
 from benchmarks.learned import imitation, reinforcement
+from benchmarks.manifest import manifest
 from benchmarks.objects import objects
 from benchmarks.placing import placing
 from benchmarks.planning import planning
@@ -42,6 +43,7 @@ PROGRAM = Program(
             imitation,
             reinforcement,
             teleop,
+            manifest,
         )
     },
 )

@@ -9,15 +9,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TypeVar
 
-from layouts.frames import (
-    ORIGIN,
-    Frame,
-    HangingError,
-    Pose,
-    check_frame_names,
-    numbers,
-    resolve,
-)
+from layouts.frames import ORIGIN, Frame, HangingError, Pose, check_frame_names, numbers, resolve
 from layouts.placement import Placement, RobotLike, placed
 from robot_layouts.core.bounds import FAR, checked_number, shown
 from robot_layouts.kinematics.quaternions import yaw_quaternion

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from robot_layouts.core.quoting import columns
 from robot_layouts.kinematics.quaternions import yaw_degrees
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
     from layouts.placement import Placement
 
-COLUMNS = ("#", "name", "robot", "action", "base x, y, z (m)", "facing", "keyframe", "reach (m)")
+HEADS = ("#", "name", "robot", "action", "base x, y, z (m)", "facing", "keyframe", "reach (m)")
 
 
 def describe(layout: Arrangement) -> str:
@@ -39,8 +40,8 @@ def describe(layout: Arrangement) -> str:
         )
         for number, (name, placement) in enumerate(parts.items(), start=1)
     ]
-    columns = (*COLUMNS, *(["on"] if hanging else []), *(["control mode"] if modes else []))
-    return "\n".join([headline(layout), *_aligned([columns, *rows])])
+    heads = (*HEADS, *(["on"] if hanging else []), *(["control mode"] if modes else []))
+    return "\n".join([headline(layout), *columns([heads, *rows])])
 
 
 def _mode_text(name: str, owner: str, modes: Mapping[str, str | None]) -> str:
@@ -69,11 +70,3 @@ def facing_text(placement: Placement) -> str:
 def decimal(value: float, digits: int = 3) -> str:
     """Round to ``digits`` decimals and drop trailing zeros; there is no minus zero."""
     return f"{round(value, digits) + 0.0:g}"
-
-
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    ]

@@ -158,14 +158,22 @@ def table_tops(
     """
     tops = {name: tuple(corners) for name, corners in table_outlines(frames).items()}
     if table is not None:
-        if not (
-            all(math.isfinite(x) for x in table) and table[0] < table[2] and table[1] < table[3]
-        ):
-            raise LayoutError(f"table is {table}; it must be x_min, y_min, x_max, y_max (m)")
-        x_min, y_min, x_max, y_max = table
+        x_min, y_min, x_max, y_max = rectangle("table", table)
         outline = ((x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max))
         tops["table"] = tuple((x, y, 0.0) for x, y in outline)
     return tops
+
+
+def rectangle(what: str, value: object) -> Rectangle:
+    """Return an outline: x_min, y_min, x_max, y_max (m).
+
+    Raises:
+        LayoutError: If it is not four numbers, or not in this order.
+    """
+    x_min, y_min, x_max, y_max = numbers(what, value, 4)
+    if x_min >= x_max or y_min >= y_max:
+        raise LayoutError(f"{what} is {shown(value)}; it must be x_min, y_min, x_max, y_max (m)")
+    return x_min, y_min, x_max, y_max
 
 
 def wall(position: Vector3, *, yaw: float = 0.0) -> Frame:

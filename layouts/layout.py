@@ -121,7 +121,7 @@ class Layout(Arrangement):
             LayoutError: If the path ends otherwise.
             AssetError: If a robot's files cannot be found or are invalid.
         """
-        from layouts.export import write_urdf
+        from layouts.export.urdf import write_urdf
 
         return write_urdf(self, path, relative=relative, visuals=visuals)
 
@@ -134,7 +134,7 @@ class Layout(Arrangement):
 
         Args:
             path: Where to save; must end in ``.dmd.yaml``.
-            visuals: Whether to include what the robots look like.
+            visuals: See `to_mjcf`.
 
         Returns:
             The path of the directives.
@@ -142,9 +142,10 @@ class Layout(Arrangement):
         Raises:
             LayoutError: If the path ends otherwise.
             AssetError: If a robot's files cannot be found or are invalid.
-            MissingPackageError: If trimesh is not installed.
+            DescriptorError: If a descriptor contradicts its URDF.
+            MissingPackageError: If scipy is not installed.
         """
-        from layouts.export import write_drake
+        from layouts.export.drake import write_drake
 
         return write_drake(self, path, visuals=visuals)
 
@@ -176,9 +177,9 @@ class Layout(Arrangement):
             LayoutError: If the path ends otherwise, or the folder holds something else.
             AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
-            MissingPackageError: If trimesh or scipy is not installed.
+            MissingPackageError: If scipy is not installed.
         """
-        from layouts.export import write_mjcf
+        from layouts.export.mjcf import write_mjcf
 
         return write_mjcf(self, path, visuals=visuals)
 
@@ -205,11 +206,14 @@ class Layout(Arrangement):
             LayoutError: If the path ends otherwise.
             AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
-            MissingPackageError: If usd-core, trimesh or scipy is not installed.
+            MissingPackageError: If usd-core or scipy is not installed.
         """
-        from layouts.export import write_usd
+        from layouts.export.files import expect_ending
 
-        return write_usd(self, path, visuals=visuals)
+        target = expect_ending(path, "a USD stage", ".usd", ".usda", ".usdc")
+        from layouts.export.usd import write_usd  # which needs usd-core
+
+        return write_usd(self, target, visuals=visuals)
 
     def to_ros2(self, folder: str | PathLike[str], *, visuals: bool = True) -> Path:
         """Save the layout as a ROS 2 package for MoveIt and ros2_control, meshes included.
@@ -234,9 +238,9 @@ class Layout(Arrangement):
             LayoutError: If the folder's name is no valid package name, or it holds something else.
             AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
-            MissingPackageError: If trimesh or scipy is not installed.
+            MissingPackageError: If scipy is not installed.
         """
-        from layouts.export import write_ros2
+        from layouts.export.ros2 import write_ros2
 
         return write_ros2(self, folder, visuals=visuals)
 

@@ -12,12 +12,13 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats
-from robots import AssetError, MissingPackageError
+from robots import AssetError
+from robots.bodies.hulls import primitive
 from robots.urdf.mesh_files import expect_near, load_scene
 from robots.urdf.model import UrdfShape
 from robots.urdf.paths import resolve
-from robots.urdf.reading import read_model
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.reading import model_of
+from robots.urdf.summary import root_of
 from robots.urdf.text import numbers_of
 
 Rgba = tuple[float, float, float, float]  # 0 … 1
@@ -53,11 +54,8 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Visual, ...]]:
     Raises:
         AssetError: If a mesh is missing or cannot be read or is as large as no robot, or a shape
             is unknown.
-        MissingPackageError: If trimesh is not installed.
     """
-    require_trimesh("drawing a robot")
-    contents = read_urdf(urdf)
-    root, model = parse_urdf(contents, str(urdf)), read_model(contents, str(urdf))
+    root, model = root_of(urdf), model_of(urdf)
     colours = dict(_named_colours(root, urdf))
     drawn: dict[str, tuple[Visual, ...]] = {}
     for link in root.iterfind("link"):
@@ -70,20 +68,6 @@ def read_visuals(urdf: Path) -> dict[str, tuple[Visual, ...]]:
         if parts:
             drawn[link.get("name", "")] = parts
     return drawn
-
-
-def require_trimesh(what: str) -> None:
-    """Say which command installs trimesh.
-
-    Raises:
-        MissingPackageError: If it is not installed.
-    """
-    try:
-        import trimesh  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError as error:
-        raise MissingPackageError(
-            f"{what} needs trimesh: pip install 'robot-layouts[view]'"
-        ) from error
 
 
 def coloured(mesh: Any, rgba: Rgba) -> Visual:
@@ -172,24 +156,9 @@ def _visual_parts(shape: UrdfShape, rgba: Rgba | None, urdf: Path) -> Iterator[V
     if shape.kind == "mesh":
         yield from _mesh_parts(shape, urdf, shape.origin @ np.diag([*shape.sizes, 1.0]), rgba)
         return
-    mesh = _primitive(shape)
+    mesh = primitive(shape, SIDES)
     mesh.apply_transform(shape.origin)
     yield coloured(mesh, rgba or GREY)
-
-
-def _primitive(shape: UrdfShape) -> Any:
-    import trimesh
-
-    match shape.kind:
-        case "box":
-            return trimesh.creation.box(shape.sizes)
-        case "sphere":
-            return trimesh.creation.icosphere(subdivisions=3, radius=shape.sizes[0])
-        case "cylinder":
-            return trimesh.creation.cylinder(*shape.sizes, sections=SIDES)
-        case _:
-            radius, length = shape.sizes
-            return trimesh.creation.capsule(length, radius, count=[SIDES, SIDES])
 
 
 def _mesh_parts(shape: UrdfShape, urdf: Path, pose: Floats, rgba: Rgba | None) -> Iterator[Visual]:

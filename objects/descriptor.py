@@ -13,6 +13,7 @@ from robot_layouts.core.bounds import checked_number, expect_unit
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robot_layouts.core.schema import check_fields, within
 from robots.descriptor import IDENTITY, Quaternion
+from robots.parts import Frozen
 
 Opening = Annotated[float, within(1e-4, 1.0, "m")]
 
@@ -118,7 +119,7 @@ class ObjectDescriptor:
         for name, quaternion in self.rests.items():
             expect_unit(f"{self.name}: rests[{name!r}]", quaternion, DescriptorError)
         for name in ("rests", "points", "sizes"):
-            object.__setattr__(self, name, _FrozenMapping(getattr(self, name)))
+            object.__setattr__(self, name, Frozen(getattr(self, name)))
 
     @property
     def all_parts(self) -> tuple[Shape, ...]:
@@ -239,22 +240,6 @@ class ObjectDescriptor:
         joints = f"{len(self.joints)} joints, " if self.joints else ""
         counts = f"{len(self.parts)} parts, {joints}{len(self.grasps)} grasps"
         return f"ObjectDescriptor({self.name!r}{member}: {counts})"
-
-
-class _FrozenMapping(dict[str, object]):
-    """A dict that hashes by its items and refuses to change (and still pickles)."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(tuple(self.items()))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return (_FrozenMapping, (dict(self),))
-
-    def _refuse(self, *_: object, **__: object) -> None:
-        raise TypeError("a descriptor is frozen; use dataclasses.replace to change it")
-
-    __setitem__ = __delitem__ = __ior__ = pop = clear = popitem = _refuse  # pyright: ignore
-    update = setdefault = _refuse  # pyright: ignore[reportAssignmentType]
 
 
 def _times(place: Place, factor: float) -> Place:

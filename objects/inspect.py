@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
 from objects.descriptor import ObjectDescriptor
 from objects.registry import ObjectRegistry
 from objects.shapes import Mesh
 from robot_layouts.core.cli import Word
 from robot_layouts.core.commands import print_error, printable
+from robot_layouts.core.quoting import columns
 
 OBJECT = Word("OBJECT", about="a name that `robot-layouts objects list` prints")
 
@@ -24,7 +25,7 @@ def list_objects() -> int:
         long = " × ".join(f"{100 * length:.3g}" for length in thing.extent)
         rests, count = ", ".join(thing.rests), str(len(thing.grasps))
         rows.append((thing.name, long, f"{thing.mass:.2g}", count, rests, thing.about))
-    print(printable("\n".join(_table(rows))))
+    print(printable("\n".join(columns(rows))))
     for failure in failures:
         print_error(failure)
     return 1 if failures else 0
@@ -46,7 +47,7 @@ def report(thing: ObjectDescriptor) -> str:
             f" quaternion wxyz {_row(turn)}"
             for name, turn in thing.rests.items()
         ],
-        "points": _table(
+        "points": columns(
             [
                 (name, f"{_row(point.position)} m", f"wxyz {_row(point.quaternion)}")
                 for name, point in thing.points.items()
@@ -84,13 +85,6 @@ def _parts(thing: ObjectDescriptor) -> Iterator[str]:
     for density, friction in materials:
         rubs = "the world's friction" if friction is None else f"friction {friction.static:g}"
         yield f"{density:g} kg/m³, {rubs}"
-
-
-def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """Yield a line for each row, with columns of equal width."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
 
 
 def _row(values: Iterable[float]) -> str:

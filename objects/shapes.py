@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import hypot
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +10,7 @@ from robot_layouts.core.bounds import FAR, checked_number, expect_unit
 from robot_layouts.core.errors import SimulationError
 from robot_layouts.core.schema import check_fields, within
 from robots.descriptor import IDENTITY, Quaternion
+from robots.urdf.mesh_files import has_volume
 
 Fraction = Annotated[float, within(0.0, 1.0)]
 Color = tuple[Fraction, Fraction, Fraction, Fraction]  # red, green, blue, alpha
@@ -25,7 +25,6 @@ Factor = Annotated[float, within(1e-6, FAR)]
 
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 FEWEST_CORNERS, MOST_CORNERS = 4, 64  # of a hull; PhysX takes as many on any processor
-THINNEST = 1e-6  # m; of a hull
 
 
 @dataclass(frozen=True)
@@ -186,13 +185,15 @@ class ConvexHull(Shape):
         Raises:
             SimulationError: If there are fewer corners or more, or they have no volume.
         """
+        import numpy as np  # which declaring other shapes need not load
+
         super().__post_init__()
         if not FEWEST_CORNERS <= len(self.corners) <= MOST_CORNERS:
             raise SimulationError(
                 f"ConvexHull: corners has {len(self.corners)} entries; it must have"
                 f" {FEWEST_CORNERS} to {MOST_CORNERS}"
             )
-        if _is_flat(self.corners):
+        if not has_volume(np.array(self.corners)):
             raise SimulationError("ConvexHull: corners lie in one plane; a hull needs a volume")
 
 
@@ -262,32 +263,3 @@ def scaled(shape: Shape, factor: float) -> Shape:
             return replace(moved, scale=(a * factor, b * factor, c * factor))
         case _:
             raise SimulationError(f"a {type(shape).__name__} has no size that could be changed")
-
-
-def _is_flat(corners: tuple[Place, ...]) -> bool:
-    """Whether points are all but in one plane, or on one line, or one point."""
-    first = corners[0]
-    ways = [_minus(corner, first) for corner in corners]
-    along = _unit(max(ways, key=lambda way: hypot(*way)))
-    across = _unit(max((_cross(along, way) for way in ways), key=lambda way: hypot(*way)))
-    heights = [sum(a * b for a, b in zip(across, way, strict=True)) for way in ways]
-    beside = _cross(along, across)
-    widths = [sum(a * b for a, b in zip(beside, way, strict=True)) for way in ways]
-    return min(_spread(heights), _spread(widths)) < THINNEST
-
-
-def _spread(values: list[float]) -> float:
-    return max(values) - min(values)
-
-
-def _minus(one: Place, other: Place) -> Place:
-    return (one[0] - other[0], one[1] - other[1], one[2] - other[2])
-
-
-def _cross(a: Place, b: Place) -> Place:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _unit(way: Place) -> Place:
-    length = hypot(*way) or 1.0
-    return (way[0] / length, way[1] / length, way[2] / length)

@@ -56,7 +56,6 @@ _FOR_USERS = {
 }
 _FOR_DEVELOPERS = {
     "portable": "robots.portable:portable",
-    "robots manifest": "robots.write_manifest:write_manifest",
 }
 
 PROGRAM = Program(

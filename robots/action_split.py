@@ -6,7 +6,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 
-from robot_layouts.core.errors import DescriptorError, UnknownNameError, unknown_name_message
+from robot_layouts.core.errors import (
+    DescriptorError,
+    UnknownNameError,
+    refuse,
+    unknown_name_message,
+)
 from robot_layouts.core.schema import check, check_fields
 from robots.commands import COMMANDS, FRAMES, JointCommand
 
@@ -101,24 +106,7 @@ class JointGroup:
     def __post_init__(self) -> None:
         """Refuse empty groups, repeated joints, inverted ranges and non-physical drives."""
         check_fields(self, DescriptorError)
-        if not self.joints:
-            raise DescriptorError("a joint group needs at least one joint")
-        if len(set(self.joints)) != len(self.joints):
-            raise DescriptorError(f"a joint group names a joint twice: {self.joints}")
-        if self.unit not in ("rad", "m"):
-            raise DescriptorError(f"unit is {self.unit!r}; it must be 'rad' or 'm'")
-        for name, given, known in (
-            ("command", self.command, COMMANDS),
-            ("frame", self.frame, FRAMES),
-        ):
-            if given not in known:
-                raise DescriptorError(
-                    unknown_name_message(f"{name} of a joint group", given, known)
-                )
-        self._refuse_bad_drives()
-        self._refuse_bad_followers()
-        self._refuse_bad_commands()
-        self._refuse_bad_ranges()
+        refuse(self._problems(), DescriptorError)
 
     @classmethod
     def hold(
@@ -146,81 +134,77 @@ class JointGroup:
             reset_noise=False, armature=armature,
         )  # fmt: skip
 
-    def _refuse_bad_drives(self) -> None:
+    def _problems(self) -> Iterator[str]:
+        """Yield what is wrong with it."""
+        if not self.joints:
+            yield "a joint group needs at least one joint"
+        if len(set(self.joints)) != len(self.joints):
+            yield f"a joint group names a joint twice: {self.joints}"
+        if self.unit not in ("rad", "m"):
+            yield f"unit is {self.unit!r}; it must be 'rad' or 'm'"
+        if self.command not in COMMANDS:
+            yield unknown_name_message("command of a joint group", self.command, COMMANDS)
+        if self.frame not in FRAMES:
+            yield unknown_name_message("frame of a joint group", self.frame, FRAMES)
+        yield from self._drive_problems()
+        yield from self._mimic_problems()
+        yield from self._command_problems()
+        yield from self._range_problems()
+
+    def _drive_problems(self) -> Iterator[str]:
         for name in ("stiffness", "damping", "force_limit", "armature"):
             given = getattr(self, name)
             if isinstance(given, tuple) and len(given) != len(self.joints):
-                raise DescriptorError(
-                    f"{name} has {len(given)} numbers; the group has joints {self.joints}"
-                )
+                yield f"{name} has {len(given)} numbers; the group has joints {self.joints}"
         for name in ("stiffness", "damping", "force_limit", "friction", "armature"):
             for value in _spread(getattr(self, name), 1):
                 if value < 0:
-                    raise DescriptorError(f"{name} is {value}; it must not be negative")
+                    yield f"{name} is {value}; it must not be negative"
 
-    def _refuse_bad_followers(self) -> None:
+    def _mimic_problems(self) -> Iterator[str]:
         for name in ("multipliers", "offsets"):
             given: tuple[float, ...] = getattr(self, name)
             if given and not self.mimic:
-                raise DescriptorError(f"only a mimic group has {name}; {self.joints} is not one")
+                yield f"only a mimic group has {name}; {self.joints} is not one"
             if given and len(given) != len(self.joints):
-                raise DescriptorError(
-                    f"{name} has {len(given)} numbers; the group has joints {self.joints}"
-                )
-
-        self._refuse_bad_leaders()
-
-    def _refuse_bad_leaders(self) -> None:
+                yield f"{name} has {len(given)} numbers; the group has joints {self.joints}"
         if not self.leaders and not self.lead:
             return
         if not self.mimic or self.delta:
-            raise DescriptorError(
+            yield (
                 f"only a mimic group that is driven to places has leaders; {self.joints} is not one"
             )
         for joint in self.leaders:
             if joint not in self.joints:
-                raise DescriptorError(
-                    unknown_name_message("leader of a joint group", joint, self.joints)
-                )
+                yield unknown_name_message("leader of a joint group", joint, self.joints)
         if not (self.leaders and self.lead > 0):
-            raise DescriptorError(
+            yield (
                 f"the leaders of {self.joints} are {self.leaders} and lead is {self.lead}; a"
                 " linkage needs at least one leader, and a lead above 0"
             )
 
-    def _refuse_bad_commands(self) -> None:
+    def _command_problems(self) -> Iterator[str]:
         if self.target and not self.delta:
-            raise DescriptorError(f"only a delta has a target; {self.joints} has no delta")
+            yield f"only a delta has a target; {self.joints} has no delta"
+        take = f"{self.joints} take {self.command!r}"
         if self.command != "position" and (self.mimic or self.held):
-            raise DescriptorError(
-                f"{self.joints} take {self.command!r}; a group that is held or mimics takes"
-                " positions only"
-            )
+            yield f"{take}; a group that is held or mimics takes positions only"
         if self.asks.drive and len(self.joints) != 3:
-            raise DescriptorError(
-                f"{self.joints} take {self.command!r}, which needs three joints: along x, along y,"
-                " about z"
-            )
+            yield f"{take}, which needs three joints: along x, along y, about z"
         if self.delta and not (self.asks.positions or self.asks.tcp):
-            raise DescriptorError(
-                f"{self.joints} take {self.command!r}, which asks for speeds; these are no delta"
-            )
+            yield f"{take}, which asks for speeds; these are no delta"
         if self.command == "tcp_position" and not self.delta:
-            raise DescriptorError(f"{self.joints} take 'tcp_position', which is a delta only")
+            yield f"{take}, which is a delta only"
 
-    def _refuse_bad_ranges(self) -> None:
+    def _range_problems(self) -> Iterator[str]:
         for name, value in (("lower", self.lower), ("upper", self.upper)):
             if isinstance(value, tuple) and len(value) != self.size:
-                raise DescriptorError(
-                    f"{name} has {len(value)} numbers; the group {self.joints} takes {self.size}"
-                )
+                yield f"{name} has {len(value)} numbers; the group {self.joints} takes {self.size}"
         if self.limits and len(self.limits) != len(self.joints):
-            raise DescriptorError(
-                f"limits has {len(self.limits)} pairs; the group has joints {self.joints}"
-            )
+            yield f"limits has {len(self.limits)} pairs; the group has joints {self.joints}"
         for low, high in (*self.ranges, *self.limits):
             if not low < high:
-                raise DescriptorError(f"range [{low}, {high}] of {self.joints} is not increasing")
+                yield f"range [{low}, {high}] of {self.joints} is not increasing"
 
     @property
     def size(self) -> int:

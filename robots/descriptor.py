@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar, NoReturn, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from robot_layouts.core.errors import DescriptorError, UnknownNameError
+from robot_layouts.core.errors import DescriptorError, UnknownNameError, refuse
 from robot_layouts.core.schema import check_fields
 from robots.action_split import ActionNumber, ActionSplit, JointGroup, is_gripper, names
 from robots.control_modes import CONTROL_MODES, MODES, driven_in
@@ -17,14 +17,14 @@ from robots.parts import (
     IDENTITY,
     CameraMount,
     Fingers,
+    Frozen,
     GripperMaterial,
     Home,
     Limb,
     NativeAgent,
     Quaternion,
     Vector3,
-    expect,
-    expect_different,
+    repeated,
     share_out,
 )
 
@@ -202,33 +202,35 @@ class RobotDescriptor:
         """Freeze the keyframes and refuse contradictions."""
         named = isinstance(self.name, str) and self.name.isprintable()
         check_fields(self, DescriptorError, owner=self.name if named else None)
-        expect(
-            re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) is not None,
-            f"robot name {self.name!r} must be a letter followed by letters, digits and _",
-        )
-        expect(self.reach > 0, f"{self.name}: reach is {self.reach} m; it must be positive")
-        expect_different(f"{self.name}: tcp_position_links", self.tcp_position_links)
-        expect_different(f"{self.name}: no_floor_contact", self.no_floor_contact)
-        expect_different(f"{self.name}: cameras", [camera.name for camera in self.cameras])
+        refuse(self._problems(), DescriptorError)
+        frozen = {key: tuple(float(x) for x in qpos) for key, qpos in self.keyframes.items()}
+        object.__setattr__(self, "keyframes", Frozen(frozen))
+        self.keyframe(self.home.keyframe)
+        object.__setattr__(self, "limbs", Frozen(self.limbs))
+        self._owners()
+        modes = {mode: Frozen(groups) for mode, groups in self.control_modes.items()}
+        object.__setattr__(self, "control_modes", Frozen(modes))
+        refuse(self._mode_problems(), DescriptorError)
+
+    def _problems(self) -> Iterator[str]:
+        if re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", self.name) is None:
+            yield f"robot name {self.name!r} must be a letter followed by letters, digits and _"
+        if not self.reach > 0:
+            yield f"{self.name}: reach is {self.reach} m; it must be positive"
+        yield from repeated(f"{self.name}: tcp_position_links", self.tcp_position_links)
+        yield from repeated(f"{self.name}: no_floor_contact", self.no_floor_contact)
+        yield from repeated(f"{self.name}: cameras", [camera.name for camera in self.cameras])
         pairs = self.allowed_collisions or ()
         for i, pair in enumerate(pairs):
-            expect_different(f"{self.name}: allowed_collisions[{i}]", pair)
+            yield from repeated(f"{self.name}: allowed_collisions[{i}]", pair)
         written = [" and ".join(sorted(pair)) for pair in pairs]
-        expect_different(f"{self.name}: allowed_collisions", written)
-        frozen = {key: tuple(float(x) for x in qpos) for key, qpos in self.keyframes.items()}
-        for key, qpos in frozen.items():
-            expect(
-                len(qpos) == self.dof,
-                f"{self.name}: keyframe {key!r} has {len(qpos)} numbers;"
-                f" the robot has {self.dof} joints ({', '.join(self.joints)})",
-            )
-        object.__setattr__(self, "keyframes", _Frozen(frozen))
-        self.keyframe(self.home.keyframe)
-        object.__setattr__(self, "limbs", _Frozen(self.limbs))
-        self._owners()
-        modes = {mode: _Frozen(groups) for mode, groups in self.control_modes.items()}
-        object.__setattr__(self, "control_modes", _Frozen(modes))
-        self._check_modes()
+        yield from repeated(f"{self.name}: allowed_collisions", written)
+        for key, qpos in self.keyframes.items():
+            if len(qpos) != self.dof:
+                yield (
+                    f"{self.name}: keyframe {key!r} has {len(qpos)} numbers;"
+                    f" the robot has {self.dof} joints ({', '.join(self.joints)})"
+                )
 
     @property
     def parts(self) -> Mapping[str, RobotDescriptor]:
@@ -341,13 +343,13 @@ class RobotDescriptor:
             declared_split=None,
         )
 
-    def _check_modes(self) -> None:
-        """Refuse modes of the robot's own that drive groups which it does not have."""
+    def _mode_problems(self) -> Iterator[str]:
+        """Yield modes of the robot's own that drive groups which it does not have."""
         for mode, groups in self.control_modes.items():
             for name, group in groups.items():
                 own = self.action_split.groups.get(name)
                 if own is None or own.joints != group.joints:
-                    raise DescriptorError(
+                    yield (
                         f"{self.name}: control mode {mode!r} drives {name!r} with joints"
                         f" {', '.join(group.joints)}; the action split has no such group"
                     )
@@ -466,19 +468,3 @@ class RobotDescriptor:
                     )
                 )
         return tuple(numbers)
-
-
-class _Frozen(dict[str, Any]):
-    """A dict that hashes by its items and refuses to change (and still pickles)."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(tuple(self.items()))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return (_Frozen, (dict(self),))
-
-    def _refuse(self, *_: object, **__: object) -> NoReturn:
-        raise TypeError("a descriptor is frozen; use dataclasses.replace to change it")
-
-    __setitem__ = __delitem__ = __ior__ = pop = clear = popitem = _refuse
-    update = setdefault = _refuse  # pyright: ignore[reportAssignmentType]

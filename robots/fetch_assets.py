@@ -15,13 +15,7 @@ from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import INDEX_PACKAGES
 from robots.assets.progress import size
-from robots.assets.sources import (
-    AssetSource,
-    HubSource,
-    InstalledPackage,
-    LocalCopy,
-    PackageWheel,
-)
+from robots.assets.sources import AssetSource, HubSource, InstalledPackage, LocalCopy, PackageWheel
 from robots.assets.store import AssetStore, FileState
 from robots.descriptor import RobotDescriptor
 from robots.named import FORMS, named_robot
@@ -39,7 +33,6 @@ def fetch(
     source: Annotated[str, Word(choices=SOURCES)] | None = None,
     dest: Annotated[str, Word("DIR")] | None = None,
     physics_only: bool = False,
-    trust_source: bool = False,
     revision: Annotated[str, Word("REV")] | None = None,
 ) -> int:
     """Bring the files of robots to this machine, or check them.
@@ -53,7 +46,6 @@ def fetch(
         source: Use this source alone.
         dest: Folder to fill, instead of the usual local copy.
         physics_only: Leave out what only pictures need.
-        trust_source: Accept files that differ from the manifest, and mark them.
         revision: Branch, tag or commit of the Hub's dataset (default: $ROBOT_LAYOUTS_HF_REVISION,
             or main).
 
@@ -72,11 +64,11 @@ def fetch(
     if pictures and not robots:
         needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
     store = AssetStore(default_root() if dest is None else absolute(dest, "--dest"))
-    sources = _sources(source, store, offline=offline, revision=revision, trust=trust_source)
+    sources = _sources(source, store, offline=offline, revision=revision)
     if source and not robots:
         needs = {name: files for name, files in needs.items() if _holds_all(sources, files)}
     if not check:
-        ensure(_union(needs), store, sources, trust=trust_source)
+        ensure(_union(needs), store, sources)
     code = _report(needs, store)
     for failure in failures:
         print_error(failure)
@@ -103,24 +95,19 @@ def robot_files(robot: RobotDescriptor, *, pictures: bool) -> tuple[AssetFile, .
 
 
 def describe_file(file: AssetFile, store: AssetStore) -> str:
-    """Return one line: state, path, size, what it is for, where it came from."""
-    state = store.state(file)
+    """Return one line: state, path, size, what it is for."""
     use = "physics" if file.physics else "pictures"
-    fetched = store.record().get(str(file)) if state.usable else None
-    source = fetched["source"] if fetched else None
-    return f"{state.value}: {file} ({size(file.bytes)}, {use}{f'; {source}' if source else ''})"
+    return f"{store.state(file).value}: {file} ({size(file.bytes)}, {use})"
 
 
 def _sources(
-    source: str | None, store: AssetStore, *, offline: bool, revision: str | None, trust: bool
+    source: str | None, store: AssetStore, *, offline: bool, revision: str | None
 ) -> list[AssetSource]:
     if source is None:
         elsewhere = [LocalCopy(default_root())] if store.root != default_root() else []
         return elsewhere + default_sources(offline=offline, revision=revision)
-    states = FileState if trust else (FileState.VERIFIED,)
-    present = [state for state in states if state is not FileState.MISSING]
     chosen: dict[str, list[AssetSource]] = {
-        "local": [LocalCopy(default_root(), states=present)],
+        "local": [LocalCopy(default_root())],
         "hf": [HubSource(revision=revision)],
         "wheel": [PackageWheel(package) for package in INDEX_PACKAGES],
         **{package.name: [InstalledPackage(package)] for package in INDEX_PACKAGES},

@@ -25,9 +25,8 @@ from robots.guess import Guess, guess
 from robots.guessing.hints import NOTHING, Hints, hints_of
 from robots.mjcf.locator import LocalMjcf, is_mjcf
 from robots.urdf.cleaning.xacro_files import template_of, with_arguments
-from robots.urdf.reading import read_model
+from robots.urdf.reading import model_of
 from robots.urdf.srdf import read_semantics
-from robots.urdf.summary import read_urdf
 
 __all__ = ["Guess", "guess_descriptor", "main"]
 
@@ -89,9 +88,8 @@ def guess_descriptor(
 
 def _semantics(source: LocalUrdf, srdf: str | os.PathLike[str]) -> Hints:
     """Return what an SRDF makes known of the robot of a URDF."""
-    urdf, file = source.locate(), absolute(srdf, "the path of the SRDF")
-    model = read_model(read_urdf(urdf), urdf.as_posix())
-    return hints_of(read_semantics(file, model), file.name)
+    file = absolute(srdf, "the path of the SRDF")
+    return hints_of(read_semantics(file, model_of(source.locate())), file.name)
 
 
 def _argument(text: str) -> tuple[str, str]:

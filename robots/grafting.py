@@ -25,7 +25,6 @@ from robots.bodies.overlaps import guess_allowed
 from robots.control_modes import CONTROL_MODES
 from robots.descriptor import (
     IDENTITY,
-    CameraMount,
     GripperMaterial,
     Home,
     Limb,
@@ -38,8 +37,7 @@ from robots.descriptor import (
 from robots.mjcf.locator import local_source
 from robots.named import named_robot
 from robots.urdf.model import ModelJoint, UrdfModel
-from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.reading import model_of
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
@@ -176,20 +174,6 @@ def with_tool(
     return replace(made, reach=_reach(robot, made))
 
 
-def with_camera(robot: RobotDescriptor, camera: CameraMount) -> RobotDescriptor:
-    """Return a robot with one more camera.
-
-    Raises:
-        DescriptorError: If it has a camera of that name.
-        UnknownNameError: If it has no such link.
-        AssetError: If its files cannot be found.
-    """
-    links = _model(robot.urdf).links
-    if camera.link not in links:
-        raise UnknownNameError(f"link of {robot.name}", camera.link, links)
-    return replace(robot, cameras=(*robot.cameras, camera))
-
-
 def on_body(
     name: str, body: UrdfSource | str | os.PathLike[str], mounts: Mapping[str, Mount]
 ) -> RobotDescriptor:
@@ -301,8 +285,7 @@ def _robot(given: RobotLike) -> RobotDescriptor:
 
 
 def _model(source: UrdfSource) -> UrdfModel:
-    path = source.locate()
-    return read_model(read_urdf(path), path.as_posix())
+    return model_of(source.locate())
 
 
 def _gripper_joints(robot: RobotDescriptor) -> frozenset[str]:

@@ -11,18 +11,12 @@ from functools import lru_cache
 import numpy as np
 
 from robot_layouts.core.errors import DescriptorError
-from robot_layouts.kinematics.rotations import (
-    Floats,
-    inverse_pose,
-    quaternion_of,
-    transform,
-)
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
 from robot_layouts.kinematics.tree import Tree
 from robots.action_split import JointGroup, is_gripper
 from robots.descriptor import RobotDescriptor
 from robots.urdf.model import UrdfModel
-from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.reading import model_of
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
@@ -66,7 +60,7 @@ class GripperMotion:
         self.joints = tuple(joint for group in groups for joint in group.joints)
         places = [robot.joints.index(joint) for joint in self.joints]
         limits = tree.limits[places]
-        ends = np.concatenate([_ends(group, tree.limits, robot) for group in groups])
+        ends = np.concatenate([ends_of(group, tree.limits, robot) for group in groups])
         self._ends = np.clip(ends, limits[:, :1], limits[:, 1:])
         self._travels = self._ends[:, 1] - self._ends[:, 0]
         if not np.isfinite(self._ends).all() or not self._travels.any():
@@ -157,8 +151,14 @@ def gripper_motion(robot: RobotDescriptor) -> GripperMotion:
     return GripperMotion(robot)
 
 
-def _ends(group: JointGroup, limits: Floats, robot: RobotDescriptor) -> Floats:
-    """Return where each joint of a group is when closed and when open, (joints, 2) (rad, m)."""
+def ends_of(group: JointGroup, limits: Floats, robot: RobotDescriptor) -> Floats:
+    """Return where each joint of a gripper is when closed and when open, (joints, 2) (rad, m).
+
+    Args:
+        group: The gripper's.
+        limits: Of the robot's joints, in the descriptor's order, (dof, 2) (rad, m).
+        robot: The robot.
+    """
     own = limits[[robot.joints.index(joint) for joint in group.joints]]
     if group.delta or group.target or group.command != "position":
         return own
@@ -264,8 +264,7 @@ def tips(tree: Tree, robot: RobotDescriptor, qpos: Floats) -> Floats:
 
 
 def _model(robot: RobotDescriptor) -> UrdfModel:
-    urdf = robot.urdf.locate()
-    return read_model(read_urdf(urdf), urdf.as_posix())
+    return model_of(robot.urdf.locate())
 
 
 def _poses(tree: Tree, qpos: Floats) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 from robot_layouts.core.cli import Word, main_of
 from robot_layouts.core.commands import print_error, start
 from robot_layouts.core.paths import default_root
+from robot_layouts.core.quoting import columns
 from robots.assets.locator import LocalUrdf, UrdfLocator
 from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
 from robots.assets.packages import SourceError, find_package
@@ -22,8 +23,8 @@ from robots.mjcf.locator import LocalMjcf
 from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
-from robots.urdf.reading import read_model
-from robots.urdf.summary import read_cleaned, read_urdf
+from robots.urdf.reading import model_of
+from robots.urdf.summary import read_cleaned
 from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
@@ -51,17 +52,10 @@ def list_robots() -> int:
     robots, failures = RobotRegistry.load_all()
     rows = [("robot", "joints", "action", "reach (m)", "numbers from")]
     rows += [(r.name, str(r.dof), str(r.action_dim), f"{r.reach:g}", r.source) for r in robots]
-    print("\n".join(_table(rows)))
+    print("\n".join(columns(rows)))
     for failure in failures:
         print_error(failure)
     return 1 if failures else 0
-
-
-def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """Yield a line for each row, with columns of equal width."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
 
 
 def report(robot: RobotDescriptor, store: AssetStore) -> str:
@@ -124,8 +118,8 @@ def find_urdf(robot: RobotDescriptor, store: AssetStore) -> tuple[Path | None, s
     file = next(
         file for file in package.needed(urdf.file, pictures=False) if file.path == urdf.file
     )
-    if store.state(file).usable:
-        return store.path(file), f"{store.path(file)} ({store.state(file).value})"
+    if store.state(file) is FileState.VERIFIED:
+        return store.path(file), f"{store.path(file)} ({FileState.VERIFIED.value})"
     try:
         path = find_package(package.origin.distribution) / package.origin.folder / urdf.file
     except SourceError:
@@ -145,11 +139,11 @@ def _joints(robot: RobotDescriptor, urdf: Path | None) -> Iterable[str]:
         joint: name for name, group in robot.action_split.groups.items() for joint in group.joints
     }
     rows = [("joint", "type", "limits", "effort", "speed", "driven by")]
-    for joint in read_model(read_urdf(urdf), urdf.name).moving:
+    for joint in model_of(urdf).moving:
         driven = groups.get(joint.name, "nothing")
         mimics = f" (URDF: mimics {joint.mimics})" if joint.mimics else ""
         rows.append((joint.name, joint.type, _limits(joint), *_bounds(joint), driven + mimics))
-    return _table(rows)
+    return columns(rows)
 
 
 def _limits(joint: ModelJoint) -> str:
@@ -166,7 +160,7 @@ def _bounds(joint: ModelJoint) -> tuple[str, str]:
     )
 
 
-def _drives(robot: RobotDescriptor) -> Iterator[str]:
+def _drives(robot: RobotDescriptor) -> Iterable[str]:
     rows = [("group", "joints", "stiffness", "damping", "force limit", "friction", "armature")]
     for name, group in robot.action_split.groups.items():
         force, per = ("N", "N/m") if group.unit == "m" else ("N·m", "N·m/rad")
@@ -181,7 +175,7 @@ def _drives(robot: RobotDescriptor) -> Iterator[str]:
                 f"{_numbers(group.armature)} {'kg' if group.unit == 'm' else 'kg·m²'}",
             )
         )
-    return _table(rows)
+    return columns(rows)
 
 
 def _how_driven(group: JointGroup) -> str:
@@ -205,7 +199,7 @@ def _keyframes(robot: RobotDescriptor, urdf: Path | None) -> Iterator[str]:
 
 def _tcp_places(robot: RobotDescriptor, urdf: Path) -> dict[str, Sequence[float]]:
     """Return where the TCP is at each keyframe, in the base frame (m)."""
-    model = read_model(read_urdf(urdf), urdf.name)
+    model = model_of(urdf)
     others = [joint.name for joint in model.moving if joint.name not in robot.joints]
     tree = kinematic_tree(model, [*robot.joints, *others])
     qpos = np.zeros((len(robot.keyframes), len(tree.coordinates)))

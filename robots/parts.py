@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import combinations, groupby
+from typing import Any, NoReturn
 
 from robot_layouts.core.bounds import expect_unit
-from robot_layouts.core.errors import DescriptorError
+from robot_layouts.core.errors import DescriptorError, refuse
 from robot_layouts.core.schema import check_fields
 from robots.action_split import ActionSplit
 
@@ -23,6 +24,24 @@ _Owners = dict[str, str | None]
 
 BODY = "body"  # what takes action numbers and is no limb: a torso that turns, a base that drives
 LARGEST_IMAGE = 16384  # pixels; what graphics drivers allow
+
+
+class Frozen(dict[str, Any]):
+    """A dict that hashes by its items and refuses to change (and still pickles)."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        """Hash the items in their order."""
+        return hash(tuple(self.items()))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by the items."""
+        return (Frozen, (dict(self),))
+
+    def _refuse(self, *_: object, **__: object) -> NoReturn:
+        raise TypeError("a descriptor is frozen; use dataclasses.replace to change it")
+
+    __setitem__ = __delitem__ = __ior__ = pop = clear = popitem = _refuse
+    update = setdefault = _refuse  # pyright: ignore[reportAssignmentType]
 
 
 @dataclass(frozen=True)
@@ -46,15 +65,17 @@ class GripperMaterial:
     def __post_init__(self) -> None:
         """Refuse invalid links, and numbers that no contact has."""
         check_fields(self, DescriptorError)
-        expect(bool(self.links), "GripperMaterial: links is empty; name the links that touch")
-        expect_different("GripperMaterial: links", self.links)
+        refuse(self._problems(), DescriptorError)
+
+    def _problems(self) -> Iterator[str]:
+        if not self.links:
+            yield "GripperMaterial: links is empty; name the links that touch"
+        yield from repeated("GripperMaterial: links", self.links)
         for name in ("static_friction", "dynamic_friction", "patch_radius"):
-            value = getattr(self, name)
-            expect(value >= 0, f"GripperMaterial: {name} is {value}; it must not be negative")
-        expect(
-            0 <= self.restitution <= 1,
-            f"GripperMaterial: restitution is {self.restitution}; it must be between 0 and 1",
-        )
+            if (value := getattr(self, name)) < 0:
+                yield f"GripperMaterial: {name} is {value}; it must not be negative"
+        if not 0 <= self.restitution <= 1:
+            yield f"GripperMaterial: restitution is {self.restitution}; it must be between 0 and 1"
 
 
 @dataclass(frozen=True)
@@ -82,24 +103,19 @@ class Fingers:
     def __post_init__(self) -> None:
         """Refuse links that are not two, and numbers that tell no grasp."""
         check_fields(self, DescriptorError)
-        expect_different("Fingers: links", self.links)
-        expect(
-            set(self.opening_signs) <= {1, -1},
-            f"Fingers: opening_signs is {self.opening_signs}; each must be 1 or -1",
-        )
-        expect(
-            self.min_force >= 0,
-            f"Fingers: min_force is {self.min_force} N; it must not be negative",
-        )
-        expect(
-            0 <= self.max_angle <= 180,
-            f"Fingers: max_angle is {self.max_angle} degrees; it must be between 0 and 180",
-        )
-        expect(
-            all(map(any, self.opening_axes)),
-            f"Fingers: opening_axes is {self.opening_axes}; each must have a length, such as"
-            f" {OWN_Y}",
-        )
+        refuse(self._problems(), DescriptorError)
+
+    def _problems(self) -> Iterator[str]:
+        yield from repeated("Fingers: links", self.links)
+        if not set(self.opening_signs) <= {1, -1}:
+            yield f"Fingers: opening_signs is {self.opening_signs}; each must be 1 or -1"
+        if self.min_force < 0:
+            yield f"Fingers: min_force is {self.min_force} N; it must not be negative"
+        if not 0 <= self.max_angle <= 180:
+            yield f"Fingers: max_angle is {self.max_angle} degrees; it must be between 0 and 180"
+        if not all(map(any, self.opening_axes)):
+            axes = f"{self.opening_axes}; each must have a length, such as {OWN_Y}"
+            yield f"Fingers: opening_axes is {axes}"
 
     def __repr__(self) -> str:
         """Show the fields, but not axes that are both y: digests of older descriptors stay."""
@@ -126,12 +142,13 @@ class NativeAgent:
     def __post_init__(self) -> None:
         """Refuse repeated names and a negative speed."""
         check_fields(self, DescriptorError)
-        expect_different("NativeAgent: tcp_links", self.tcp_links)
-        expect_different("NativeAgent: base_joints", self.base_joints)
-        expect(
-            self.base_speed >= 0,
-            f"NativeAgent: base_speed is {self.base_speed}; it must not be negative",
-        )
+        refuse(self._problems(), DescriptorError)
+
+    def _problems(self) -> Iterator[str]:
+        yield from repeated("NativeAgent: tcp_links", self.tcp_links)
+        yield from repeated("NativeAgent: base_joints", self.base_joints)
+        if self.base_speed < 0:
+            yield f"NativeAgent: base_speed is {self.base_speed}; it must not be negative"
 
 
 @dataclass(frozen=True)
@@ -163,20 +180,19 @@ class CameraMount:
     def __post_init__(self) -> None:
         """Refuse what no camera can be."""
         check_fields(self, DescriptorError)
+        expect_unit(f"camera {self.name!r}: quaternion", self.quaternion, DescriptorError)
+        refuse(self._problems(), DescriptorError)
+
+    def _problems(self) -> Iterator[str]:
         camera = f"camera {self.name!r}"
-        expect_unit(f"{camera}: quaternion", self.quaternion, DescriptorError)
         for name, pixels in (("width", self.width), ("height", self.height)):
-            expect(
-                0 < pixels <= LARGEST_IMAGE,
-                f"{camera}: {name} is {pixels} pixels; it must be between 1 and {LARGEST_IMAGE}",
-            )
-        expect(
-            0 < self.fov < math.pi, f"{camera}: fov is {self.fov} rad; it must be between 0 and pi"
-        )
-        expect(
-            0 < self.near < self.far,
-            f"{camera}: near is {self.near} m and far {self.far} m; it must be 0 < near < far",
-        )
+            if not 0 < pixels <= LARGEST_IMAGE:
+                most = f"it must be between 1 and {LARGEST_IMAGE}"
+                yield f"{camera}: {name} is {pixels} pixels; {most}"
+        if not 0 < self.fov < math.pi:
+            yield f"{camera}: fov is {self.fov} rad; it must be between 0 and pi"
+        if not 0 < self.near < self.far:
+            yield f"{camera}: near is {self.near} m and far {self.far} m; it must be 0 < near < far"
 
 
 @dataclass(frozen=True)
@@ -225,8 +241,12 @@ class Limb:
     def __post_init__(self) -> None:
         """Refuse an invalid reach, and links that are named twice."""
         check_fields(self, DescriptorError)
-        expect(self.reach > 0, f"Limb: reach is {self.reach} m; it must be positive")
-        expect_different("Limb: tcp_position_links", self.tcp_position_links)
+        refuse(self._problems(), DescriptorError)
+
+    def _problems(self) -> Iterator[str]:
+        if not self.reach > 0:
+            yield f"Limb: reach is {self.reach} m; it must be positive"
+        yield from repeated("Limb: tcp_position_links", self.tcp_position_links)
 
 
 def both_sides(
@@ -327,13 +347,8 @@ def _refuse_gaps(limbs: Mapping[str, Limb], owners: _Owners, split: ActionSplit)
             )
 
 
-def expect(right: bool, otherwise: str) -> None:
-    """Raise a `DescriptorError` that says what is wrong, unless all is right."""
-    if not right:
-        raise DescriptorError(otherwise)
-
-
-def expect_different(what: str, names: Sequence[str]) -> None:
-    """Raise a `DescriptorError` if a name is given twice."""
+def repeated(what: str, names: Sequence[str]) -> Iterator[str]:
+    """Yield that names are given twice, if some are."""
     twice = sorted({name for name in names if names.count(name) > 1})
-    expect(not twice, f"{what} has {', '.join(twice)} more than once")
+    if twice:
+        yield f"{what} has {', '.join(twice)} more than once"

@@ -21,6 +21,7 @@ from robot_layouts.kinematics.rotations import Floats
 from robots.action_split import is_gripper
 from robots.bodies.hulls import RobotModel, load_model
 from robots.descriptor import RobotDescriptor
+from robots.gripper_motion import ends_of
 from robots.urdf.tcp import find_tcp
 
 if TYPE_CHECKING:
@@ -134,20 +135,12 @@ def _grips(part: RobotDescriptor) -> bool:
 
 def _posed(robot: RobotDescriptor, model: RobotModel, limb: _Limb, rest: Floats, at: str) -> Floats:
     """Return all joints with the gripper of a limb open or closed, (dof,) (rad, m)."""
-    qpos = rest.copy()
+    qpos, limits = rest.copy(), model.kinematics.limits
     for name, group in limb.part.action_split.groups.items():
-        if not is_gripper(name):
-            continue
-        for i, joint in enumerate(group.joints):
-            low, high = group.ranges[0 if group.mimic else i]
-            value = high if at == "open" else low
-            if group.delta:
-                value = (group.limits[i] if group.limits else (low, high))[at == "open"]
-            elif group.mimic:
-                times, plus = group.followers[i]
-                value = times * value + plus
-            qpos[robot.joints.index(joint)] = value
-    return qpos.clip(*model.kinematics.limits.T)
+        if is_gripper(name):
+            joints = [robot.joints.index(joint) for joint in group.joints]
+            qpos[joints] = ends_of(group, limits, robot)[:, GRIPPER[::-1].index(at)]
+    return qpos.clip(*limits.T)
 
 
 def _draw_robot(

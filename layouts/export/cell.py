@@ -15,17 +15,12 @@ from layouts.export.files import Names
 from layouts.frames import TABLE_DEPTH, table_outlines
 from layouts.placement import Placement
 from robot_layouts.core.commands import notice
-from robot_layouts.kinematics.rotations import (
-    Floats,
-    inverse_pose,
-    pose_matrix,
-    transform,
-)
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, transform
 from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel
-from robots.urdf.reading import read_model
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.reading import model_of
+from robots.urdf.summary import root_of
 from robots.urdf.tcp import find_tcp
 from robots.urdf.text import numbers_of
 from robots.urdf.tree import kinematic_tree
@@ -274,7 +269,6 @@ def _source(robot: RobotDescriptor, name: str, *, visuals: bool) -> RobotSource:
             raise
         urdf, drawn = robot.urdf.locate(), False
         notice(f"{robot.name} is drawn by its collision shapes: {error}")
-    contents = read_urdf(urdf)
-    model = read_model(contents, str(urdf))
+    model = model_of(urdf)
     kinematic_tree(model, robot.joints)  # refuses a descriptor that contradicts its URDF
-    return RobotSource(robot, name, urdf, parse_urdf(contents, str(urdf)), model, drawn)
+    return RobotSource(robot, name, urdf, root_of(urdf), model, drawn)

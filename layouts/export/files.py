@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -15,6 +16,26 @@ from robots.assets.manifest import load_manifest
 from robots.descriptor import UrdfSource
 
 LICENCES = "LICENCES.md"  # a note on those of robot files
+
+
+def expect_ending(path: str | os.PathLike[str], what: str, *endings: str) -> Path:
+    """Return the path of a file to be.
+
+    Args:
+        path: The path.
+        what: What is saved, for the message.
+        endings: What its name may end in.
+
+    Raises:
+        LayoutError: If it ends otherwise.
+    """
+    target = Path(path)
+    name = target.name.lower()
+    if name in endings or not name.endswith(endings):
+        raise LayoutError(
+            f"cannot save {what} as {target.name!r}; the name must end in {', '.join(endings)}"
+        )
+    return target
 
 
 class Names:

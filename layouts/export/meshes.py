@@ -12,9 +12,10 @@ import numpy as np
 from layouts.export.cell import RobotSource
 from layouts.export.files import Names
 from layouts.visuals import GREY, Rgba, read_visuals, simplified
-from robot_layouts.kinematics.rotations import Floats
-from robots import AssetError, MissingPackageError
+from robot_layouts.core.importing import optional
+from robots import AssetError
 from robots.bodies.hulls import shape_corners
+from robots.urdf.mesh_files import binary_stl
 from robots.urdf.model import SIZES, UrdfShape
 
 AS_HULLS = ("mesh", "capsule")  # of which most formats' own shapes are not what they are here
@@ -91,7 +92,7 @@ def solid_shapes(
 
     Raises:
         AssetError: If a mesh is missing or cannot be read, or a shape has no volume.
-        MissingPackageError: If trimesh or scipy is not installed.
+        MissingPackageError: If scipy is not installed.
     """
     return {
         link: tuple(
@@ -103,14 +104,10 @@ def solid_shapes(
 
 
 def _hull(shape: UrdfShape, source: RobotSource) -> Any:
+    import trimesh
+
     corners = shape_corners(shape, source.urdf)
-    try:
-        import scipy  # noqa: F401  # pyright: ignore[reportUnusedImport]
-        import trimesh
-    except ImportError as error:
-        raise MissingPackageError(
-            "convex hulls need trimesh and scipy: pip install 'robot-layouts[checks]'"
-        ) from error
+    optional("scipy", "convex hulls need scipy", "checks")
     try:
         return trimesh.convex.convex_hull(corners)
     except Exception as error:  # qhull's own, for what is all but flat
@@ -118,35 +115,27 @@ def _hull(shape: UrdfShape, source: RobotSource) -> Any:
 
 
 class MeshFolder:
-    """A folder of binary STL files, whose names lead to no other folder."""
+    """A folder of binary STL or of Wavefront files, whose names lead to no other folder."""
 
-    def __init__(self, folder: Path) -> None:
-        """Make it if need be."""
+    def __init__(self, folder: Path, ending: str = ".stl") -> None:
+        """Make it if need be; the ending of its files chooses the format."""
         folder.mkdir(parents=True, exist_ok=True)
-        self._folder, self._names = folder, Names()
+        self._folder, self._ending, self._names = folder, ending, Names()
 
     def save(self, mesh: Any, name: str) -> str:
-        """Write a trimesh under a name like the one given, and return the file's name."""
-        file = f"{self._names.new(name)}.stl"
-        save_stl(mesh.vertices, mesh.faces, self._folder / file)
+        """Write a trimesh under a name like the one given, and return the file's name.
+
+        Triangles without an area are left out of an STL.
+        """
+        file = f"{self._names.new(name)}{self._ending}"
+        if self._ending == ".stl":
+            corners = np.asarray(mesh.vertices, float)[np.asarray(mesh.faces, int)]  # (n, 3, 3)
+            flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            (self._folder / file).write_bytes(binary_stl(corners[flat.any(axis=1)]))
+            return file
+        import trimesh
+
+        bare = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+        path = self._folder / file
+        bare.export(path, include_normals=False, include_texture=False, include_color=False)
         return file
-
-
-def save_stl(vertices: Floats, faces: Any, path: Path) -> None:
-    """Write a mesh as binary STL; triangles without an area are left out.
-
-    Args:
-        vertices: (n, 3) (m).
-        faces: Indices of three corners each, (m, 3).
-        path: The file.
-    """
-    corners = np.asarray(vertices, float)[np.asarray(faces, int)]  # (m, 3, 3)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    kept = lengths > 0
-    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
-    triangles = np.zeros(int(kept.sum()), kind)
-    triangles["normal"] = normals[kept] / lengths[kept, None]
-    triangles["corners"] = corners[kept]
-    header = b"binary STL".ljust(80) + np.uint32(len(triangles)).tobytes()
-    path.write_bytes(header + triangles.tobytes())

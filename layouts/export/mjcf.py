@@ -12,13 +12,13 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from layouts.export.cell import ExportedCell, RobotSource, Standing
-from layouts.export.files import LICENCES, licence_note, replaced_folder
+from layouts.export.files import LICENCES, expect_ending, licence_note, replaced_folder
 from layouts.export.meshes import CollisionShape, Drawn, MeshFolder, drawn_meshes, solid_shapes
 from layouts.visuals import GREY, Rgba
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
-from robots import CameraMount, LayoutError
+from robots import CameraMount
 from robots.urdf.model import LinkInertia, ModelJoint
 
 if TYPE_CHECKING:
@@ -44,9 +44,7 @@ LOOKING = (0.5, 0.5, -0.5, -0.5)
 
 def write_mjcf(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
     """Write a layout as MJCF; see `layouts.Layout.to_mjcf`."""
-    target = Path(path)
-    if target.suffix.lower() != ".xml":
-        raise LayoutError(f"cannot save MJCF as {target.name!r}; the name must end in .xml")
+    target = expect_ending(path, "MJCF", ".xml")
     cell = ExportedCell.read(layout, visuals=visuals)
     folder = target.absolute().with_name(f"{target.stem}_assets")
     with replaced_folder(folder, _is_own, "save the model under another name") as made:

@@ -8,20 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
+from layouts.export.files import expect_ending
 from robot_layouts.core.writing import written_whole
-from robot_layouts.kinematics.quaternions import quaternion_rpy
-from robots import LayoutError, RobotDescriptor
+from robots import RobotDescriptor
 from robots.assets.assembled import rename
 from robots.bodies.allowed import joined_pairs, read_allowed_pairs
-from robots.descriptor import Vector3
 from robots.urdf.paths import resolve
-from robots.urdf.reading import read_model
+from robots.urdf.reading import model_of
 from robots.urdf.srdf import srdf_beside
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.summary import root_of
+from robots.urdf.writing import joint_element, origin_at
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
-    from layouts.placement import Placement
 
 WORLD = "world"
 COPIED = ("material", "link", "joint")  # elements of a robot that are taken over
@@ -35,15 +34,15 @@ def write_urdf(
     visuals: bool = True,
 ) -> Path:
     """Write a layout as one URDF; see `layouts.Layout.to_urdf`."""
-    target = Path(path)
-    if target.suffix.lower() != ".urdf":
-        raise LayoutError(f"cannot save a URDF as {target.name!r}; the name must end in .urdf")
+    target = expect_ending(path, "a URDF", ".urdf")
     folder = target.absolute().parent if relative else None
     urdf, semantics = Element("robot", name=target.stem), Element("robot", name=target.stem)
     SubElement(urdf, "link", name=WORLD)
     for place, placement in layout.items():
         file = placement.robot.urdf.locate(pictures=visuals)
-        urdf.append(_fixed_to_world(place, placement, file))
+        root = f"{place}/{model_of(file).root}"
+        origin = origin_at(placement.base_position, placement.base_quaternion)
+        urdf.append(joint_element(f"{place}/base", "fixed", WORLD, root, origin))
         urdf.extend(_renamed(file, place, folder, visuals=visuals))
         semantics.extend(_disabled_pairs(placement.robot, file, place))
     _write(urdf, target)
@@ -55,23 +54,9 @@ def write_urdf(
     return target
 
 
-def base_link(file: Path) -> str:
-    """Return the name of the link of a URDF that hangs on no joint."""
-    return read_model(read_urdf(file), str(file)).root
-
-
-def _fixed_to_world(place: str, placement: Placement, file: Path) -> Element:
-    joint = Element("joint", name=f"{place}/base", type="fixed")
-    SubElement(joint, "parent", link=WORLD)
-    SubElement(joint, "child", link=f"{place}/{base_link(file)}")
-    turn = quaternion_rpy(placement.base_quaternion)
-    SubElement(joint, "origin", xyz=_text(placement.base_position), rpy=_text(turn))
-    return joint
-
-
 def _renamed(file: Path, place: str, folder: Path | None, *, visuals: bool) -> Iterator[Element]:
     """Yield the elements of a robot with names behind its place, and files by their paths."""
-    for element in parse_urdf(read_urdf(file), str(file)):
+    for element in root_of(file):
         if element.tag not in COPIED:
             continue
         for visual in [] if visuals else element.findall("visual"):
@@ -93,12 +78,12 @@ def _disabled_pairs(robot: RobotDescriptor, file: Path, place: str) -> Iterator[
     """
     pairs: list[Element] = []
     if robot.allowed_collisions is not None:
-        model = read_model(read_urdf(file), str(file))
+        model = model_of(file)
         apart = read_allowed_pairs(robot, model, file) - joined_pairs(model)
         for one, other in sorted(sorted(p) for p in apart if p <= model.collisions.keys()):
             pairs.append(Element("disable_collisions", link1=one, link2=other, reason="Default"))
     elif (srdf := srdf_beside(file)) is not None:
-        pairs.extend(parse_urdf(read_urdf(srdf), str(srdf)).iterfind("disable_collisions"))
+        pairs.extend(root_of(srdf).iterfind("disable_collisions"))
     for pair in pairs:
         for key in ("link1", "link2"):
             pair.set(key, f"{place}/{pair.get(key)}")
@@ -109,7 +94,3 @@ def _write(root: Element, target: Path) -> None:
     indent(root)
     with written_whole(target) as unfinished:
         ElementTree(root).write(unfinished, encoding="utf-8", xml_declaration=True)
-
-
-def _text(values: Vector3) -> str:
-    return " ".join(repr(value) for value in values)

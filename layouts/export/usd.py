@@ -12,6 +12,10 @@ from layouts.export.cell import ExportedCell, RobotSource, Standing
 from layouts.export.files import Names, licence_note
 from layouts.export.meshes import drawn_meshes, solid_shapes
 from layouts.export.usd_prims import (
+    Usd,
+    UsdGeom,
+    UsdPhysics,
+    UsdShade,
     add_box,
     add_camera,
     add_drawn,
@@ -23,27 +27,18 @@ from layouts.export.usd_prims import (
     set_inertia,
     surface,
     tie,
-    usd_modules,
 )
 from robot_layouts.core.writing import PARTIAL, written_whole
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix
-from robots import LayoutError
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
 
-ENDINGS = (".usd", ".usda", ".usdc")
 FORBIDDEN = r"[^A-Za-z0-9_]"
 
 
-def write_usd(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
+def write_usd(layout: Arrangement, target: Path, *, visuals: bool = True) -> Path:
     """Write a layout as a USD stage; see `layouts.Layout.to_usd`."""
-    target = Path(path)
-    if target.suffix.lower() not in ENDINGS:
-        raise LayoutError(
-            f"cannot save a USD stage as {target.name!r}; the name must end in {', '.join(ENDINGS)}"
-        )
-    usd_modules("Usd")  # before anything is read
     cell = ExportedCell.read(layout, visuals=visuals)
     stage = _Stage(cell, _identifier(target.stem))
     for source in cell.sources:
@@ -82,8 +77,6 @@ class _Stage:
     """A stage that grows robot by robot."""
 
     def __init__(self, cell: ExportedCell, name: str) -> None:
-        Usd, UsdGeom, UsdPhysics = usd_modules("Usd", "UsdGeom", "UsdPhysics")
-
         self._cell, self._stage = cell, Usd.Stage.CreateInMemory()
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.z)
         UsdGeom.SetStageMetersPerUnit(self._stage, 1.0)
@@ -117,8 +110,6 @@ class _Stage:
 
     def add_surroundings(self) -> None:
         """Define tables and frames."""
-        UsdGeom = usd_modules("UsdGeom")
-
         tables, frames = (_Paths(f"{self._paths.above}/{what}") for what in ("tables", "frames"))
         for name, (pose, size) in self._cell.tables.items():
             add_box(self._stage, tables.of(name), pose, size)
@@ -128,8 +119,6 @@ class _Stage:
 
     def add_robot(self, standing: Standing) -> None:
         """Define a robot: its links where they are at home, and its joints."""
-        UsdGeom, UsdPhysics = usd_modules("UsdGeom", "UsdPhysics")
-
         source = standing.source
         prim = UsdGeom.Xform.Define(self._stage, self._paths.of(standing.place))
         place(prim, standing.base)
@@ -147,8 +136,6 @@ class _Stage:
         self._add_mounts(standing, links)
 
     def _add_link(self, source: RobotSource, link: str, path: str, pose: Floats) -> None:
-        UsdGeom, UsdPhysics, UsdShade = usd_modules("UsdGeom", "UsdPhysics", "UsdShade")
-
         made = UsdGeom.Xform.Define(self._stage, path)
         prim = made.GetPrim()
         place(made, pose)
@@ -188,8 +175,6 @@ class _Stage:
 
     def _add_mounts(self, standing: Standing, links: _Paths) -> None:
         """Define tool centre points and cameras, on the links that carry them."""
-        UsdGeom = usd_modules("UsdGeom")
-
         for tool in self._cell.tools:
             if tool.place == standing.place:
                 name = _identifier(f"tcp_{tool.arm}")

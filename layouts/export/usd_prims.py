@@ -1,17 +1,20 @@
-"""Prims of a USD stage: meshes, plain shapes, masses, surfaces, cameras and joints."""
+"""Prims of a USD stage: meshes, plain shapes, masses, surfaces, cameras and joints.
+
+Importing this needs usd-core.
+"""
 
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from layouts.export.cell import RobotSource
 from layouts.export.meshes import CollisionShape, Drawn
+from robot_layouts.core.importing import optional
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, quaternion_of
-from robots import CameraMount, GripperMaterial, MissingPackageError
+from robots import CameraMount, GripperMaterial
 from robots.urdf.model import LinkInertia, ModelJoint
 
 # From a camera that looks along +x, z up, to USD's, which looks along -z, y up (wxyz).
@@ -19,22 +22,12 @@ LOOKING = (0.5, 0.5, -0.5, -0.5)
 APERTURE = 20.955  # of USD's cameras, unless they say otherwise; tenths of a unit
 
 
-def usd_modules(*names: str) -> Any:
-    """Return one or several modules of the package ``pxr``.
+def _pxr(name: str) -> Any:
+    return optional(f"pxr.{name}", "USD stages need usd-core", "usd")
 
-    Args:
-        names: Their names, such as ``"UsdGeom"``.
 
-    Raises:
-        MissingPackageError: If usd-core is not installed.
-    """
-    try:
-        modules = [import_module(f"pxr.{name}") for name in names]
-    except ImportError as error:
-        raise MissingPackageError(
-            "USD stages need usd-core: pip install 'robot-layouts[usd]'"
-        ) from error
-    return modules if len(modules) > 1 else modules[0]
+Gf, Sdf, Usd, UsdGeom = map(_pxr, ("Gf", "Sdf", "Usd", "UsdGeom"))
+UsdPhysics, UsdShade, Vt = map(_pxr, ("UsdPhysics", "UsdShade", "Vt"))
 
 
 def place(xformable: Any, pose: Floats, scale: Floats | None = None) -> None:
@@ -45,16 +38,12 @@ def place(xformable: Any, pose: Floats, scale: Floats | None = None) -> None:
         pose: (4, 4) (m).
         scale: What it is scaled by first, (3,).
     """
-    Gf = usd_modules("Gf")
-
     matrix = pose if scale is None else pose @ np.diag([*scale, 1.0])
     xformable.MakeMatrixXform().Set(Gf.Matrix4d(*matrix.T.flatten().tolist()))
 
 
 def quaternion(rotation: Floats) -> Any:
     """Return a rotation matrix, (3, 3), as a quaternion of single precision."""
-    Gf = usd_modules("Gf")
-
     w, x, y, z = quaternion_of(rotation).tolist()
     return Gf.Quatf(w, x, y, z)
 
@@ -69,8 +58,6 @@ def add_drawn(stage: Any, path: str, drawn: Drawn) -> None:
 
 def add_solid(stage: Any, path: str, solid: CollisionShape) -> None:
     """Define a shape that collides and is not drawn."""
-    UsdGeom, UsdPhysics = usd_modules("UsdGeom", "UsdPhysics")
-
     shape = solid.shape
     if solid.hull is not None:
         made = _mesh(stage, path, solid.hull)
@@ -104,8 +91,6 @@ def add_box(stage: Any, path: str, pose: Floats, size: Floats) -> None:
         pose: Of its middle, (4, 4) (m).
         size: (3,) (m).
     """
-    UsdGeom, UsdPhysics = usd_modules("UsdGeom", "UsdPhysics")
-
     made = UsdGeom.Cube.Define(stage, path)
     made.CreateSizeAttr(1.0)
     place(made, pose, size)
@@ -114,8 +99,6 @@ def add_box(stage: Any, path: str, pose: Floats, size: Floats) -> None:
 
 def set_inertia(prim: Any, inertial: LinkInertia) -> None:
     """Give a link mass and inertia."""
-    Gf, UsdPhysics = usd_modules("Gf", "UsdPhysics")
-
     moments, axes = np.linalg.eigh(inertial.tensor)
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
@@ -128,8 +111,6 @@ def set_inertia(prim: Any, inertial: LinkInertia) -> None:
 
 def surface(stage: Any, path: str, material: GripperMaterial | None) -> Any:
     """Return the material of what grasps, which is defined if it is not yet."""
-    UsdPhysics, UsdShade = usd_modules("UsdPhysics", "UsdShade")
-
     made = UsdShade.Material.Define(stage, path)
     if material is not None:
         api = UsdPhysics.MaterialAPI.Apply(made.GetPrim())
@@ -141,8 +122,6 @@ def surface(stage: Any, path: str, material: GripperMaterial | None) -> Any:
 
 def add_camera(stage: Any, path: str, camera: CameraMount) -> None:
     """Define a robot's camera."""
-    Gf, UsdGeom = usd_modules("Gf", "UsdGeom")
-
     made = UsdGeom.Camera.Define(stage, path)
     turn = pose_matrix((0.0, 0.0, 0.0), LOOKING)
     place(made, pose_matrix(camera.position, camera.quaternion) @ turn)
@@ -154,8 +133,6 @@ def add_camera(stage: Any, path: str, camera: CameraMount) -> None:
 
 
 def _mesh(stage: Any, path: str, mesh: Any) -> Any:
-    UsdGeom, Vt = usd_modules("UsdGeom", "Vt")
-
     points = np.ascontiguousarray(mesh.vertices, np.float32)
     faces = np.ascontiguousarray(mesh.faces, np.int32)
     made = UsdGeom.Mesh.Define(stage, path)
@@ -176,8 +153,6 @@ def add_fixed_base(stage: Any, path: str, link: str, base: Floats) -> None:
         link: Path of the root link.
         base: Pose of that link in the world, (4, 4) (m).
     """
-    UsdPhysics = usd_modules("UsdPhysics")
-
     joint = UsdPhysics.FixedJoint.Define(stage, path)
     joint.CreateBody1Rel().SetTargets([link])
     _set_frames(joint, base, np.eye(3))
@@ -204,8 +179,6 @@ def add_joint(
         source: Its robot.
         home: Its position where the layout starts the robot (rad or m).
     """
-    UsdPhysics = usd_modules("UsdPhysics")
-
     kinds: dict[str, Any] = {
         "fixed": UsdPhysics.FixedJoint,
         "prismatic": UsdPhysics.PrismaticJoint,
@@ -263,8 +236,6 @@ def tie(prim: Any, leader: str, joint: ModelJoint) -> None:
 
 def set_attribute(prim: Any, name: str, kind: str, value: Any) -> None:
     """Give a prim an attribute of no schema, of a kind such as ``"Float"``."""
-    Sdf = usd_modules("Sdf")
-
     prim.CreateAttribute(name, getattr(Sdf.ValueTypeNames, kind)).Set(value)
 
 
@@ -275,8 +246,6 @@ def _per_unit(joint: ModelJoint) -> float:
 
 def _set_frames(joint: Any, origin: Floats, turned: Floats) -> None:
     """Set a joint's frames on both links, the second at that link's origin."""
-    Gf = usd_modules("Gf")
-
     joint.CreateLocalPos0Attr(Gf.Vec3f(*origin[:3, 3].tolist()))
     joint.CreateLocalRot0Attr(quaternion(origin[:3, :3] @ turned))
     joint.CreateLocalPos1Attr(Gf.Vec3f(0.0, 0.0, 0.0))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 
 from layouts.frames import Frame
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, load_robots
 from robot_layouts.core.bounds import checked_number, checked_whole
-from robot_layouts.core.errors import MissingPackageError
+from robot_layouts.core.importing import optional
 from robot_layouts.core.progress import Progress
 from robots import LayoutError
 
@@ -76,12 +75,7 @@ def search(
         AssetError: If a robot's files cannot be found or are invalid.
         MissingPackageError: If python-fcl or scipy is not installed.
     """
-    try:
-        import_module("scipy")
-    except ImportError as error:
-        raise MissingPackageError(
-            "a search for places needs scipy and python-fcl: pip install 'robot-layouts[checks]'"
-        ) from error
+    optional("scipy", "a search for places needs scipy and python-fcl", "checks")
     from layouts.placing.bases import ground_of
     from layouts.placing.cost import requirements_of
     from layouts.placing.refinement import centred, expect_sound, find_layout

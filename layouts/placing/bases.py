@@ -9,10 +9,10 @@ from itertools import product
 
 import numpy as np
 
-from layouts.frames import EDGES, Frame, Pose, Rectangle, resolve, table_outlines
+from layouts.frames import EDGES, Frame, Pose, Rectangle, rectangle, resolve, table_outlines
 from layouts.placement import Placement, faced
 from layouts.placing import Around
-from robot_layouts.core.bounds import FAR, checked_number, checked_numbers, shown
+from robot_layouts.core.bounds import FAR, checked_number, shown
 from robot_layouts.kinematics.quaternions import yaw_quaternion
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
 from robots import LayoutError, RobotDescriptor, UnknownNameError
@@ -143,7 +143,7 @@ def ground_of(
         LayoutError: If an argument is invalid, or leaves no place.
     """
     reach = max(robot.reach for robot in robots.values())
-    bounds = None if within is None else _rectangle("within", within)
+    bounds = None if within is None else rectangle("within", within)
     high = _heights(heights, robots)
     if around is None:
         return Ground((_on_the_ground(bounds, targets, reach, len(robots)),), {}, high)
@@ -154,7 +154,7 @@ def ground_of(
         return Ground(surfaces, dict(around), high)
     if not hasattr(around, "__len__") or isinstance(around, str) or len(around) != 4:
         raise _no_ground(around)
-    x_min, y_min, x_max, y_max = _rectangle("around", around)
+    x_min, y_min, x_max, y_max = rectangle("around", around)
     out = (x_min - EDGE, y_min - EDGE, x_max + EDGE, y_max + EDGE)
     low, top = (x_min - reach, y_min - reach), (x_max + reach, y_max + reach)
     surface = _clipped(BaseSurface(None, Pose(), low, top, keep_out=out), bounds)
@@ -162,13 +162,6 @@ def ground_of(
     if not any(surface.allows(x, y) for x, y in corners):
         raise LayoutError(f"within {within} there is no room around {tuple(around)}")
     return Ground((surface,), {}, high)
-
-
-def _rectangle(what: str, value: object) -> Rectangle:
-    x_min, y_min, x_max, y_max = checked_numbers(what, value, 4, FAR, LayoutError)
-    if x_min >= x_max or y_min >= y_max:
-        raise LayoutError(f"{what} is {shown(value)}; it must be x_min, y_min, x_max, y_max (m)")
-    return x_min, y_min, x_max, y_max
 
 
 def _no_ground(around: object) -> LayoutError:

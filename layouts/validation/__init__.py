@@ -1,13 +1,7 @@
 """Checks of a layout before anything moves, from the robots' real collision shapes."""
 
 from layouts.validation.check import validate
-from layouts.validation.findings import (
-    Clearance,
-    Finding,
-    LinkPair,
-    SharedWorkspace,
-    TargetReach,
-)
+from layouts.validation.findings import Clearance, Finding, LinkPair, SharedWorkspace, TargetReach
 from layouts.validation.report import Report
 
 __all__ = [

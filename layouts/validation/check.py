@@ -45,13 +45,7 @@ from layouts.validation.report import Report
 from robot_layouts.core.bounds import shown
 from robot_layouts.core.progress import Progress
 from robot_layouts.kinematics.rotations import Floats
-from robots import (
-    AssetError,
-    DescriptorError,
-    LayoutError,
-    RobotLayoutsError,
-    UnknownNameError,
-)
+from robots import AssetError, DescriptorError, LayoutError, RobotLayoutsError, UnknownNameError
 from robots.bodies.hulls import RobotModel, load_model
 
 Targets = Mapping[str, Sequence[float]] | Sequence[Sequence[float]]

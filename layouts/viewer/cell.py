@@ -109,7 +109,7 @@ class ShownCell:
             LayoutError: If the motion is of other robots, or of no moments.
             AssetError: If a robot's files cannot be found or are invalid.
             DescriptorError: If a descriptor contradicts its URDF.
-            MissingPackageError: If trimesh or python-fcl is not installed.
+            MissingPackageError: If python-fcl is not installed.
         """
         self.title, self.layout = printable(title), layout
         self.things = dict(things or {})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import errno
-import http.client
 import io
 import logging
 import socket
@@ -13,11 +12,11 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager, redirect_stdout
 from typing import Any, NamedTuple
 
-from layouts.viewer.guard import MESSAGE_BYTES, Guard, fits, is_wildcard
-from robots import MissingPackageError, RobotLayoutsError
+from layouts.viewer.guard import MESSAGE_BYTES, Guard, fits
+from robot_layouts.core.importing import optional
+from robots import RobotLayoutsError
 
 LAST_PORT = 65535
-PROBE_SECONDS = 10.0
 REST = 0.002  # s between two messages of a browser, which sends 120 in a second of dragging
 # Requests without the token are not logged on the terminal; to see them, add a handler.
 LOG = logging.getLogger(__name__)
@@ -59,13 +58,17 @@ def serving(host: str, port: int, title: str) -> Generator[PageServer, None, Non
     port = _free_port(host, port)
     guard = Guard.of(host, port)
     started: list[Any] = []
-    with redirect_stdout(io.StringIO()), _guarded(guard, started):  # of viser's own banner
+    with redirect_stdout(io.StringIO()), _guarded(guard, started) as guarded:  # without a banner
         server: Any = viser.ViserServer(host=host, port=port, label=title, verbose=False)
     started.append(server)
     try:
         if server.get_port() != port:  # viser goes on to the next one without a word
             raise ViewerError(_in_use(host, port))
-        _check_guarded(server, host, port)
+        if not guarded or not hasattr(server.gui, "_gui_input_handle_from_uuid"):
+            raise ViewerError(
+                f"viser {viser.__version__} would accept any client, so no page is served:"
+                " pip install 'viser>=1.1.1,<1.2'"
+            )
         yield PageServer(server, guard.address(host))
     finally:
         with redirect_stdout(io.StringIO()):
@@ -78,17 +81,11 @@ def import_viser() -> Any:
     Raises:
         MissingPackageError: If it is not installed.
     """
-    try:
-        import viser
-    except ImportError as error:
-        raise MissingPackageError(
-            "a page needs viser: pip install 'robot-layouts[view]'"
-        ) from error
-    return viser
+    return optional("viser", "a page needs viser", "view")
 
 
 @contextmanager
-def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
+def _guarded(guard: Guard, started: list[Any]) -> Generator[list[object], None, None]:
     """Let the guard see what comes to the server that viser starts meanwhile, before viser does.
 
     viser has no option for that, but the `websockets` package on which it stands has: viser's call
@@ -97,14 +94,20 @@ def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
     Args:
         guard: Answers every request.
         started: Will hold the viser server; until then no message is taken.
+
+    Yields:
+        What viser handles connections with, if it came by here: nothing before, nor if it is a
+        version that serves in another way.
     """
     from websockets.asyncio import server as websockets
 
     serve = websockets.serve
+    guarded: list[object] = []
 
     def serve_guarded(handler: Callable[..., Any], *where: Any, **options: Any) -> Any:
         if not handler.__module__.startswith("viser."):  # of another thread, and none of ours
             return serve(handler, *where, **options)
+        guarded.append(handler)
         page = options.get("process_request")
 
         def answer(connection: Any, request: Any) -> Any:
@@ -116,7 +119,7 @@ def _guarded(guard: Guard, started: list[Any]) -> Generator[None, None, None]:
     with _STARTING:
         websockets.serve = serve_guarded  # pyright: ignore[reportAttributeAccessIssue]
         try:
-            yield
+            yield guarded
         finally:
             websockets.serve = serve
 
@@ -142,41 +145,6 @@ def _sifted(handler: Callable[..., Any], started: list[Any]) -> Callable[..., An
         await handler(connection)
 
     return handle
-
-
-def _check_guarded(server: Any, host: str, port: int) -> None:
-    """Ask the server for the page and for a WebSocket, without the token.
-
-    Raises:
-        ViewerError: If it does not refuse both.
-    """
-    import viser
-
-    upgrade = {
-        "Connection": "Upgrade",
-        "Upgrade": "websocket",
-        "Sec-WebSocket-Version": "13",
-        "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
-    }
-    answers = {_status(host, port, headers) for headers in ({}, upgrade)}
-    if answers != {403} or not hasattr(server.gui, "_gui_input_handle_from_uuid"):
-        raise ViewerError(
-            f"viser {viser.__version__} would accept any client, so no page is served:"
-            " pip install 'viser>=1.1.1,<1.2'"
-        )
-
-
-def _status(host: str, port: int, headers: dict[str, str]) -> int:
-    if is_wildcard(host):
-        host = "::1" if ":" in host else "127.0.0.1"
-    connection = http.client.HTTPConnection(host, port, timeout=PROBE_SECONDS)
-    try:
-        connection.request("GET", "/", headers=headers)
-        return connection.getresponse().status
-    except (OSError, http.client.HTTPException) as error:
-        raise ViewerError(f"the page at {host}, port {port}, does not answer: {error}") from error
-    finally:
-        connection.close()
 
 
 def _free_port(host: str, port: int) -> int:

@@ -126,6 +126,20 @@ def closest_match(name: object, choices: Iterable[str]) -> str | None:
     return next(iter(_alike(name, choices, 1, 0.5)), None)
 
 
+def refuse(problems: Iterable[str], error: type[RobotLayoutsError]) -> None:
+    """Raise an error that says the first of some problems, if there is one.
+
+    Args:
+        problems: What is wrong, a sentence each; looked for no further than the first.
+        error: What is raised.
+
+    Raises:
+        RobotLayoutsError: The given error.
+    """
+    for problem in problems:
+        raise error(problem)
+
+
 def unknown_name_message(kind: str, name: object, choices: Iterable[str], hint: str = "") -> str:
     """Say that ``name`` is not a ``kind``, the closest match, and all choices or those like it."""
     choices = tuple(choices)

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robot_layouts.core.errors import MissingPackageError, RobotLayoutsError
+from robot_layouts.core.errors import RobotLayoutsError
+from robot_layouts.core.importing import optional
 from robot_layouts.core.writing import written_whole
 
 if TYPE_CHECKING:
@@ -35,13 +36,8 @@ def blank_figure(
     Raises:
         MissingPackageError: If matplotlib is not installed.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingPackageError(
-            f"{what} needs matplotlib: pip install 'robot-layouts[preview]'"
-        ) from error
-    return Figure(figsize=size, dpi=dots_per_inch, facecolor="white")
+    matplotlib = optional("matplotlib.figure", f"{what} needs matplotlib", "preview")
+    return matplotlib.Figure(figsize=size, dpi=dots_per_inch, facecolor="white")
 
 
 def save_figure(

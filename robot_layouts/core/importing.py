@@ -1,4 +1,4 @@
-"""Things of a user's own modules by name: ``MODULE:NAME``."""
+"""Modules by name: of packages that need not be installed, and of users: ``MODULE:NAME``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,26 @@ from importlib import import_module
 from typing import Any
 
 from robot_layouts.core.catalogue import reason
-from robot_layouts.core.errors import RobotLayoutsError, closest_match
+from robot_layouts.core.errors import MissingPackageError, RobotLayoutsError, closest_match
 from robot_layouts.core.rooms import PACKAGES
+
+
+def optional(module: str, what: str, extra: str) -> Any:
+    """Return a module of a package that need not be installed.
+
+    Args:
+        module: Its name.
+        what: What needs which package, for the message.
+        extra: What installs it with this library.
+
+    Raises:
+        MissingPackageError: If it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        words = f"{what}: pip install 'robot-layouts[{extra}]'"
+        raise MissingPackageError(words) from error
 
 
 def imported(word: str, what: str, error: type[RobotLayoutsError], hint: str = "") -> Any:

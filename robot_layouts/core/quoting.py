@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from reprlib import Repr
 from typing import Any
 
@@ -26,6 +27,15 @@ def shortened(message: str) -> str:
 def cut(text: str, length: int) -> str:
     """Return the beginning of a text that is too long, for a picture or a table."""
     return text if len(text) <= length else f"{text[: length - 1]}…"
+
+
+def columns(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return a line for each row of a table, with columns of equal width."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
 
 
 class _Short(Repr):

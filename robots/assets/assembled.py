@@ -7,19 +7,19 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, indent, tostring
 
 from robot_layouts.core.bounds import expect_unit
 from robot_layouts.core.errors import DescriptorError, UnknownNameError, UnwritableFileError
 from robot_layouts.core.paths import default_root
 from robot_layouts.core.schema import check
 from robot_layouts.core.writing import written_whole
-from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots.descriptor import IDENTITY, Quaternion, UrdfSource, Vector3
 from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
-from robots.urdf.reading import read_model
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.reading import model_of
+from robots.urdf.summary import root_of
+from robots.urdf.writing import joint_element, origin_at
 
 URDF = "assembled.urdf"
 
@@ -104,13 +104,12 @@ class _Assembly:
     ) -> str:
         """Take a URDF over, or what one link of it carries, and return the new name of its root."""
         path = source.locate(pictures=self._pictures)
-        contents = read_urdf(path)
-        model = read_model(contents, path.as_posix())
+        model = model_of(path)
         root = root or model.root
         wanted = carried_by(model, [root]) - carried_by(model, without)
         if root not in wanted:
             raise DescriptorError(f"nothing is left without {root!r}, which carries the rest")
-        for element in parse_urdf(contents, path.as_posix()):
+        for element in root_of(path):
             if not _belongs(element, wanted, root):
                 continue
             for visual in [] if self._pictures else element.findall("visual"):
@@ -125,12 +124,10 @@ class _Assembly:
         if part.link not in self._names["link"]:
             raise UnknownNameError("link to fix something to", part.link, self._names["link"])
         root = self.take(part.urdf, part.prefix, part.root)
-        joint = SubElement(self._robot, "joint", name=f"{root}_mount", type="fixed")
-        self._expect_new(joint, Path(root))
-        SubElement(joint, "parent", link=part.link)
-        SubElement(joint, "child", link=root)
-        turn = quaternion_rpy(part.quaternion)
-        SubElement(joint, "origin", xyz=_text(part.position), rpy=_text(turn))
+        origin = origin_at(part.position, part.quaternion)
+        mount = joint_element(f"{root}_mount", "fixed", part.link, root, origin)
+        self._expect_new(mount, Path(root))
+        self._robot.append(mount)
 
     def written(self) -> Path:
         """Write the URDF, unless it is there, and return its path."""
@@ -221,7 +218,3 @@ def write_folder(
     except UnwritableFileError:
         if not all((folder / name).is_file() for name in files):
             raise
-
-
-def _text(values: Vector3) -> str:
-    return " ".join(repr(float(value)) for value in values)

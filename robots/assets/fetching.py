@@ -13,7 +13,6 @@ from robots.assets.packages import INDEX_PACKAGES, SourceError
 from robots.assets.progress import listing, say, size
 from robots.assets.sources import AssetSource, HubSource, InstalledPackage, PackageWheel
 from robots.assets.store import AssetStore, FileState
-from robots.urdf.summary import read_references
 
 
 def locate(package: str, urdf: str, *, pictures: bool) -> Path:
@@ -63,20 +62,13 @@ def default_sources(*, offline: bool = False, revision: str | None = None) -> li
     return [HubSource(revision=revision), *installed, *wheels]
 
 
-def ensure(
-    files: Sequence[AssetFile],
-    store: AssetStore,
-    sources: Sequence[AssetSource],
-    *,
-    trust: bool = False,
-) -> None:
+def ensure(files: Sequence[AssetFile], store: AssetStore, sources: Sequence[AssetSource]) -> None:
     """Make files usable in the local copy; does nothing if they are.
 
     Args:
         files: What is needed.
         store: The local copy.
         sources: Where to look, in order.
-        trust: Whether to accept files that differ from the manifest, and mark them.
 
     Raises:
         AssetError: If no source has some file, or it cannot be written; names every source tried.
@@ -94,7 +86,7 @@ def ensure(
             asked = [file for file in wanted if source.holds(file)]
             if not asked:
                 continue
-            fetch = _Fetch(source, store, scratch, trust)
+            fetch = _Fetch(source, store, scratch)
             failure = fetch.run(asked)
             if fetch.kept:
                 command = "`robot-layouts robots fetch --check` lists it, with licences"
@@ -116,7 +108,6 @@ class _Fetch:
     source: AssetSource
     store: AssetStore
     scratch: Path
-    trust: bool
     kept: set[str] = field(default_factory=set[str])  # packages of which files came along
     room: bool = True
 
@@ -125,62 +116,36 @@ class _Fetch:
         try:
             different = self._install(files, again=False)
             if different:
-                different = self._install(list(different), again=True)
+                different = self._install(different, again=True)
         except SourceError as error:
             return str(error)
         if not different:
             return ""
         return (
             f"refused, as {len(different)} files differ from the manifest, twice:"
-            f" {listing([f'{file}{how}' for file, how in different.items()])}"
-            f" (--source {self.source.name} --trust-source would accept them)"
+            f" {listing([str(file) for file in different])}"
         )
 
-    def _install(self, files: Sequence[AssetFile], *, again: bool) -> dict[AssetFile, str]:
-        """Install what the source gives, and return what differs from the manifest, and how."""
-        different: dict[AssetFile, str] = {}
-        asked, trust = set(files), self.trust and again
+    def _install(self, files: Sequence[AssetFile], *, again: bool) -> list[AssetFile]:
+        """Install what the source gives, and return what differs from the manifest."""
+        different: list[AssetFile] = []
+        asked = set(files)
         for file, data in self.source.fetch(files, self.scratch, again=again):
-            limit = file.limit(trust=trust)
             if file not in asked:
                 self._keep(file, data)
-            elif len(data) > limit:
-                different[file] = f" (more than {limit:,} bytes)"
-            elif not self._accept(file, data, trust=trust):
-                different[file] = ""
+            elif not self.store.install(file, data, scratch=self.scratch):
+                different.append(file)
         return different
 
     def _keep(self, file: AssetFile, data: bytes) -> None:
         """Keep a file that came along with another, so that it need not be fetched later."""
         try:
             if self.room and self.store.state(file) is FileState.MISSING:
-                if self._accept(file, data, trust=False):
+                if self.store.install(file, data, scratch=self.scratch):
                     self.kept.add(file.origin.name)
         except AssetError as error:  # what was asked for is there
             self.room = False
             say(f"{error} What came along is not kept.")
-
-    def _accept(self, file: AssetFile, data: bytes, *, trust: bool) -> bool:
-        if trust:
-            _expect_known_references(file, data)
-        return self.store.install(
-            file, data, scratch=self.scratch, source=self.source.title, trust=trust
-        )
-
-
-def _expect_known_references(file: AssetFile, data: bytes) -> None:
-    """Refuse a differing URDF that needs files which would not be fetched."""
-    if not file.path.endswith(".urdf"):
-        return
-    around = f"/{file.origin.mount}/" if file.origin.mount else ""
-    known = {f"{around}{f.path}" for f in load_manifest().package(file.origin.name).files}
-    try:
-        references = read_references(data, f"{around}{file.path}", exists=known.__contains__)
-    except AssetError as error:
-        raise SourceError(f"cannot be trusted: {error}") from error
-    unknown = sorted({*references.collision, *references.visual} - known)
-    if unknown:
-        raise SourceError(f"its {file} refers to files outside the manifest: {', '.join(unknown)}")
 
 
 def _failure_text(wanted: list[AssetFile], store: AssetStore, failures: list[str]) -> str:

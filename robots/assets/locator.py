@@ -84,13 +84,12 @@ class LocalUrdf:
                 `robots.urdf.reading.read_model`), or refers to files that it may not refer to (see
                 `robots.urdf.paths`).
         """
-        from robots.urdf.reading import read_model
+        from robots.urdf.reading import model_of
         from robots.urdf.summary import expect_files, read_urdf
 
         path = opened_path(self.path, self.folder)
-        xml = read_urdf(path)
-        read_model(xml, path.as_posix())
-        expect_files(xml, path.as_posix(), pictures=pictures)
+        model_of(path)
+        expect_files(read_urdf(path), path.as_posix(), pictures=pictures)
         return path
 
 

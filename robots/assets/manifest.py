@@ -15,8 +15,6 @@ from robot_layouts.core.errors import AssetError, UnknownNameError, UnreadableFi
 from robot_layouts.core.files import read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
 
-LARGEST_FILE = 2**28  # bytes
-LARGEST_TRUSTED_FILE = 2**26  # bytes; of one whose size the manifest does not promise
 _LARGEST_MANIFEST = 2**24  # bytes
 
 
@@ -70,14 +68,6 @@ class AssetFile:
     sha256: str
     physics: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
-
-    def limit(self, *, trust: bool) -> int:
-        """Return the most bytes that are read of what a source gives for it.
-
-        Args:
-            trust: Whether it may differ from what the manifest promises.
-        """
-        return max(self.bytes, LARGEST_TRUSTED_FILE) if trust else self.bytes
 
     def __str__(self) -> str:
         """Return package and path."""
@@ -152,14 +142,9 @@ class AssetManifest:
             raise UnknownNameError("package of robot files", name, sorted(self.packages))
         return self.packages[name]
 
-    def to_json(self) -> str:
-        """Return the manifest as it is kept in the repository."""
-        packages = {name: _package_to_json(self.packages[name]) for name in sorted(self.packages)}
-        return json.dumps({"packages": packages}, indent=1) + "\n"
-
     @classmethod
     def from_json(cls, text: str) -> AssetManifest:
-        """Read what `to_json` wrote; it is ours, and a test checks what it holds.
+        """Read what ``benchmarks.manifest`` wrote; it is ours, and a test checks what it holds.
 
         Raises:
             ValueError: If it is not json.
@@ -191,21 +176,6 @@ def load_manifest() -> AssetManifest:
         raise AssetError(
             f"the manifest of robot files {path} is damaged: {error}; install robot-layouts again"
         ) from error
-
-
-def _package_to_json(package: AssetPackage) -> dict[str, Any]:
-    origin = {key: value for key, value in vars(package.origin).items() if key != "name" and value}
-    files = {
-        file.path: {
-            "bytes": file.bytes,
-            "sha256": file.sha256,
-            "physics": list(file.physics),
-            "pictures": list(file.pictures),
-        }
-        for file in sorted(package.files, key=lambda file: file.path)
-    }
-    undrawable = {"undrawable": list(package.undrawable)} if package.undrawable else {}
-    return {**origin, **undrawable, "files": files}
 
 
 def _package_from_json(name: str, about: dict[str, Any]) -> AssetPackage:

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from importlib.util import find_spec
 from json import JSONDecodeError
@@ -20,9 +20,10 @@ from typing import Any, Protocol
 
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import open_regular
+from robot_layouts.core.progress import Progress
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import IndexPackage, SourceError, find_package
-from robots.assets.progress import Advance, download_bar, listing, say
+from robots.assets.progress import listing, say
 from robots.assets.store import AssetStore, FileState
 
 ENDPOINT_VARIABLE = "HF_ENDPOINT"
@@ -52,15 +53,8 @@ Contents = Iterator[tuple[AssetFile, bytes]]
 class AssetSource(Protocol):
     """A place that robot files can be fetched from."""
 
-    @property
-    def name(self) -> str:
-        """Name on the command line."""
-        ...
-
-    @property
-    def title(self) -> str:
-        """Name in messages."""
-        ...
+    name: str  # on the command line
+    title: str  # in messages
 
     def holds(self, file: AssetFile) -> bool:
         """Tell whether it may have a file; it is asked for no others."""
@@ -87,10 +81,9 @@ class LocalCopy:
 
     name = "local"
 
-    def __init__(self, root: Path, *, states: Iterable[FileState] = (FileState.VERIFIED,)) -> None:
-        """Read from a folder, taking only files in some states."""
+    def __init__(self, root: Path) -> None:
+        """Read from a folder, taking only files that are what the manifest says."""
         self._store = AssetStore(root)
-        self._states = frozenset(states)
         self.title = f"local copy {root}"
 
     def holds(self, file: AssetFile) -> bool:
@@ -103,7 +96,7 @@ class LocalCopy:
         for file in files:
             try:
                 state = self._store.state(file)
-                if state in self._states:
+                if state is FileState.VERIFIED:
                     yield file, _read(file, self._store.path(file))
                 else:
                     absent.append(f"{file} ({state.value})")
@@ -143,6 +136,7 @@ class HubSource:
     Caches, mirrors, proxies, time-outs and offline mode are those of `huggingface_hub`.
 
     Attributes:
+        title: Name in messages.
         endpoint: Address of the Hub, ``HF_ENDPOINT`` at the time of construction; None is the
             public one.
         revision: Branch, tag or commit; a commit already in the Hub's cache asks nothing.
@@ -153,12 +147,8 @@ class HubSource:
     def __init__(self, *, revision: str | None = None) -> None:
         """Take the revision, else that of ``ROBOT_LAYOUTS_HF_REVISION``, else ``main``."""
         self.endpoint = os.environ.get(ENDPOINT_VARIABLE) or None
+        self.title = "Hugging Face Hub" + (f" at {self.endpoint}" if self.endpoint else "")
         self.revision = revision or os.environ.get(REVISION_VARIABLE) or _DEFAULT_REVISION
-
-    @property
-    def title(self) -> str:
-        """Name in messages."""
-        return f"Hugging Face Hub at {self.endpoint}" if self.endpoint else "Hugging Face Hub"
 
     def holds(self, file: AssetFile) -> bool:
         """Tell whether a dataset on the Hub has a copy of a file."""
@@ -172,13 +162,13 @@ class HubSource:
             absent: list[str] = []
             pool = ThreadPoolExecutor(_DOWNLOADS_AT_ONCE)
             try:
-                with download_bar(dataset, sum(file.bytes for file in wanted)) as advance:
+                with Progress(sum(file.bytes for file in wanted) / 1e6, "MB") as progress:
                     downloads = {
-                        pool.submit(self._download, file, commit, again, _bar(advance)): file
-                        for file in wanted
+                        pool.submit(self._download, file, commit, again): file for file in wanted
                     }
                     for download in as_completed(downloads):
                         file, path = downloads[download], download.result()
+                        progress.advance(file.bytes / 1e6, dataset)
                         if path is None:
                             absent.append(_hub_path(file))
                         else:
@@ -210,7 +200,7 @@ class HubSource:
             raise SourceError(f"{self._at(dataset)}: {_reason(error)}") from error
         return about.sha or self.revision
 
-    def _download(self, file: AssetFile, commit: str, again: bool, bar: type[Any]) -> Path | None:
+    def _download(self, file: AssetFile, commit: str, again: bool) -> Path | None:
         """Return where the Hub's cache has a file, or None if the dataset lacks it."""
         from huggingface_hub import hf_hub_download
         from huggingface_hub.errors import RemoteEntryNotFoundError
@@ -225,7 +215,7 @@ class HubSource:
                 endpoint=self.endpoint,
                 token=False,
                 force_download=again,
-                tqdm_class=bar,
+                tqdm_class=_silent_bar(),
             )
             return Path(cached)
         except RemoteEntryNotFoundError:
@@ -278,7 +268,7 @@ def _read(file: AssetFile, path: Path) -> bytes:
         UnreadableFileError: If it cannot be read, or is not a regular file.
     """
     with open_regular(path) as stream:
-        return stream.read(file.limit(trust=True) + 1)
+        return stream.read(file.bytes + 1)
 
 
 def _read_cached(file: AssetFile, path: Path) -> bytes:
@@ -293,18 +283,15 @@ def _hub_path(file: AssetFile) -> str:
     return f"{file.origin.hub_folder}/{file.path}"
 
 
-def _bar(advance: Advance) -> type[Any]:
-    """Return a progress bar for the Hub's client that shows nothing, and passes on what arrives."""
+def _silent_bar() -> type[Any]:
+    """Return a progress bar for the Hub's client that shows nothing."""
     from tqdm import tqdm
 
-    class Bar(tqdm):  # pyright: ignore[reportMissingTypeArgument]
+    class SilentBar(tqdm):  # pyright: ignore[reportMissingTypeArgument]
         def __init__(self, *args: Any, **settings: Any) -> None:
             super().__init__(*args, **{**settings, "disable": True})
 
-        def update(self, n: float | None = 1) -> None:
-            advance(int(n or 0))
-
-    return Bar
+    return SilentBar
 
 
 def _reason(error: BaseException) -> str:
@@ -344,7 +331,7 @@ def _unpack(wheel: Path, wanted: Sequence[AssetFile], beside: Sequence[AssetFile
 def _unpacked(archive: zipfile.ZipFile, member: str, file: AssetFile) -> bytes:
     try:
         with archive.open(member) as stream:  # which may be larger than the archive claims
-            return stream.read(file.limit(trust=True) + 1)
+            return stream.read(file.bytes + 1)
     except _BAD_ARCHIVE as error:
         raise SourceError(f"the wheel's {member} is damaged: {error}") from error
 
@@ -365,15 +352,14 @@ def _download_wheel(requirement: str, folder: Path, again: bool) -> Path:
     ]
     environment = {**os.environ, "TMPDIR": str(folder)}  # removed with the folder, come what may
     try:
-        with download_bar(requirement, total=None):
-            done = subprocess.run(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                env=environment,
-                check=False,
-            )
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env=environment,
+            check=False,
+        )
     except OSError as error:
         raise SourceError(f"cannot run pip: {error.strerror}") from error
     wheels = sorted(folder.glob("*.whl"))

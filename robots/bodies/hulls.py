@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from robot_layouts.core.errors import AssetError, MissingPackageError
+from robot_layouts.core.errors import AssetError
+from robot_layouts.core.importing import optional
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.kinematics.tree import Tree
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
@@ -21,9 +22,8 @@ from robots.urdf.cleaning.xacro_files import template_of
 from robots.urdf.mesh_files import has_volume, read_corners
 from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
-from robots.urdf.reading import read_model
+from robots.urdf.reading import model_of
 from robots.urdf.srdf import srdf_beside
-from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
@@ -87,12 +87,7 @@ def require_packages() -> None:
     Raises:
         MissingPackageError: If python-fcl is not installed.
     """
-    try:
-        import fcl  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError as error:
-        raise MissingPackageError(
-            "checking a layout needs python-fcl: pip install 'robot-layouts[checks]'"
-        ) from error
+    optional("fcl", "checking a layout needs python-fcl", "checks")
 
 
 def read_hulls(model: UrdfModel, urdf: Path) -> tuple[Hull, ...]:
@@ -135,7 +130,7 @@ def _modified(file: Path) -> int:
 
 @lru_cache(maxsize=64)
 def _load(robot: RobotDescriptor, urdf: Path, _stamps: tuple[int, ...]) -> RobotModel:
-    model = read_model(read_urdf(urdf), str(urdf))
+    model = model_of(urdf)
     kinematics, hulls = kinematic_tree(model, robot.joints), read_hulls(model, urdf)
     allowed = read_allowed_pairs(robot, model, urdf)
     return RobotModel(kinematics, hulls, counted_pairs(kinematics, hulls, allowed))
@@ -166,22 +161,31 @@ def shape_corners(shape: UrdfShape, urdf: Path) -> Floats:
 
 def _corners(shape: UrdfShape, urdf: Path) -> Floats:
     """Return the corners of a collision shape in its own frame, (n, 3) (m)."""
+    if shape.kind == "mesh":
+        path = resolve(shape.file, urdf.as_posix(), os.path.isfile)
+        return read_corners(path, shape.sizes, shape.where, urdf.as_posix())
+    return np.asarray(primitive(shape, SIDES).vertices, float)
+
+
+def primitive(shape: UrdfShape, sides: int) -> Any:
+    """Return a shape that is no mesh as a trimesh, in its own frame (m).
+
+    Args:
+        shape: The shape.
+        sides: Of the polygon that stands for a circle.
+    """
     import trimesh
 
     match shape.kind:
-        case "mesh":
-            path = resolve(shape.file, urdf.as_posix(), os.path.isfile)
-            return read_corners(path, shape.sizes, shape.where, urdf.as_posix())
         case "box":
-            made = trimesh.creation.box(shape.sizes)
+            return trimesh.creation.box(shape.sizes)
         case "sphere":
-            made = trimesh.creation.icosphere(subdivisions=3, radius=shape.sizes[0])
+            return trimesh.creation.icosphere(subdivisions=3, radius=shape.sizes[0])
         case "cylinder":
-            made = trimesh.creation.cylinder(*shape.sizes, sections=SIDES)
+            return trimesh.creation.cylinder(*shape.sizes, sections=sides)
         case _:
             radius, length = shape.sizes
-            made = trimesh.creation.capsule(length, radius, count=[SIDES, SIDES])
-    return np.asarray(made.vertices, float)
+            return trimesh.creation.capsule(length, radius, count=[sides, sides])
 
 
 def convex_hull(link: int, corners: Floats, where: str) -> Hull:

@@ -17,14 +17,7 @@ from robots.assets.assembled import write_folder
 from robots.guessing.hints import Hints
 from robots.mjcf.couplings import Couplings, find_couplings
 from robots.mjcf.reading import MjcfText, Model, compiled, name_of, read_mjcf
-from robots.mjcf.robot import (
-    HINGE,
-    MjcfRobot,
-    dry_friction,
-    find_drives,
-    find_efforts,
-    find_robot,
-)
+from robots.mjcf.robot import HINGE, MjcfRobot, dry_friction, find_drives, find_efforts, find_robot
 from robots.mjcf.to_urdf import excluded, write_urdf
 
 FORM = 1  # of what is made of an MJCF; counted up whenever that changes

@@ -20,8 +20,9 @@ from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from robot_layouts.core.errors import AssetError, MissingPackageError, UnreadableFileError
+from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import read_regular
+from robot_layouts.core.importing import optional
 from robot_layouts.core.quoting import shown
 from robots.urdf.mesh_files import MAX_MESH_BYTES
 from robots.urdf.paths import is_allowed, leads_out
@@ -233,13 +234,7 @@ def mujoco() -> Any:
     Raises:
         MissingPackageError: If it is not installed.
     """
-    try:
-        import mujoco  # pyright: ignore[reportMissingImports]
-    except ImportError as error:
-        raise MissingPackageError(
-            "reading an MJCF needs MuJoCo: pip install 'robot-layouts[mjcf]'"
-        ) from error
-    return mujoco
+    return optional("mujoco", "reading an MJCF needs MuJoCo", "mjcf")
 
 
 @contextmanager

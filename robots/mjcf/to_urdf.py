@@ -9,32 +9,25 @@ body, become frames.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from robot_layouts.kinematics.quaternions import quaternion_rpy
-from robot_layouts.kinematics.rotations import (
-    Floats,
-    inverse_pose,
-    pose_matrix,
-    quaternion_of,
-    rotation_about,
-)
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, rotation_about
 from robots.guessing import words
 from robots.mjcf.couplings import Couplings
 from robots.mjcf.reading import Model, name_of
 from robots.mjcf.robot import SLIDE, MjcfRobot, take_name
+from robots.urdf.mesh_files import binary_stl
+from robots.urdf.writing import joint_element, origin_of, text
 
 FARTHEST = 10.0  # m; how far a slide goes each way whose range nothing says
 TOOLS = (*words.TCP, *words.GRASP, *words.TOOL, *words.END, *words.HAND, *words.TIP, *words.FLANGE)
 WORLD = "world"
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJoCo's kinds
 SEEN_GROUPS = 3  # the first groups of shapes, which MuJoCo draws unless it is asked otherwise
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
 @dataclass
@@ -126,7 +119,9 @@ class _Writer:
             elements.append(Element("link", name=carrier))
         if not joints:
             name = self._joint_name(f"{robot.links[body]}_fixed")
-            elements.append(_joint(name, "fixed", carrier, robot.links[body], start))
+            elements.append(
+                joint_element(name, "fixed", carrier, robot.links[body], origin_of(start))
+            )
             return elements, np.eye(4)
         before = np.zeros(3)  # where the frame of the link before is in the body's
         for joint in joints:
@@ -158,11 +153,11 @@ class _Writer:
         model, name = self._model, self._robot.names[joint]
         if joint in self._couplings.fixed:
             place = pose @ self._motion(joint, self._couplings.fixed[joint])
-            return _joint(name, "fixed", parent, child, place)
+            return joint_element(name, "fixed", parent, child, origin_of(place))
         slides = model.jnt_type[joint] == SLIDE
         limited = bool(model.jnt_limited[joint])
         kind = "prismatic" if slides else "revolute" if limited else "continuous"
-        element = _joint(name, kind, parent, child, pose)
+        element = joint_element(name, kind, parent, child, origin_of(pose))
         SubElement(element, "axis", xyz=text(*model.jnt_axis[joint]))
         numbers: dict[str, str] = {}
         if limited:
@@ -196,10 +191,10 @@ class _Writer:
                 link = self.free(name if name not in self._taken else f"{name}_site")
                 pose = pose_of(self._model.site_pos[site], self._model.site_quat[site])
                 place = self._inside[body] @ pose
-                joint = self._joint_name(f"{link}_fixed")
+                fixed = self._joint_name(f"{link}_fixed")
                 elements += [
                     Element("link", name=link),
-                    _joint(joint, "fixed", self._robot.links[body], link, place),
+                    joint_element(fixed, "fixed", self._robot.links[body], link, origin_of(place)),
                 ]
         return elements
 
@@ -208,14 +203,6 @@ class _Writer:
             name += "_"
         self._joints.add(name)
         return name
-
-
-def _joint(name: str, kind: str, parent: str, child: str, pose: Floats) -> Element:
-    joint = Element("joint", name=name, type=kind)
-    SubElement(joint, "parent", link=parent)
-    SubElement(joint, "child", link=child)
-    origin(joint, pose)
-    return joint
 
 
 def excluded(robot: MjcfRobot) -> tuple[tuple[str, str], ...]:
@@ -253,23 +240,15 @@ def add_shapes(
             continue
         for use in _uses(model, geom):
             shape = SubElement(link, use)
-            origin(shape, shift @ pose_of(model.geom_pos[geom], model.geom_quat[geom]))
+            SubElement(
+                shape,
+                "origin",
+                origin_of(shift @ pose_of(model.geom_pos[geom], model.geom_quat[geom])),
+            )
             _geometry(SubElement(shape, "geometry"), model, geom, meshes)
             if use == "visual":
                 _colour(shape, model, geom)
     return notes
-
-
-def origin(parent: Element, pose: Floats) -> None:
-    """Give an element the ``<origin>`` of a pose, (4, 4) (m)."""
-    w, x, y, z = quaternion_of(pose[:3, :3]).tolist()
-    px, py, pz = pose[:3, 3].tolist()
-    SubElement(parent, "origin", xyz=text(px, py, pz), rpy=text(*quaternion_rpy((w, x, y, z))))
-
-
-def text(*numbers: float) -> str:
-    """Return numbers as a URDF has them, to the last digit."""
-    return " ".join(repr(float(number)) for number in numbers)
 
 
 def pose_of(position: Floats, quaternion: Floats) -> Floats:
@@ -308,7 +287,7 @@ def _ellipsoid(x: float, y: float, z: float) -> tuple[str, bytes]:
 
     ball = trimesh.creation.icosphere(subdivisions=2)
     corners = np.asarray(ball.vertices) * (x, y, z)
-    return f"ellipsoid_{x:g}_{y:g}_{z:g}.stl", _stl(corners[ball.faces])
+    return f"ellipsoid_{x:g}_{y:g}_{z:g}.stl", binary_stl(corners[ball.faces])
 
 
 def _mesh(model: Model, geom: int) -> tuple[str, bytes]:
@@ -318,18 +297,7 @@ def _mesh(model: Model, geom: int) -> tuple[str, bytes]:
     first = int(model.mesh_faceadr[mesh])
     faces = model.mesh_face[first : first + int(model.mesh_facenum[mesh])]
     given = "".join(c if c.isalnum() and c.isascii() else "_" for c in name_of(model, "mesh", mesh))
-    return f"{mesh}_{given[:60]}.stl", _stl(np.asarray(model.mesh_vert[vertices])[faces])
-
-
-def _stl(triangles: Floats) -> bytes:
-    """Return a binary STL of triangles, (n, 3, 3) (m)."""
-    records = np.zeros(len(triangles), _RECORD)
-    records["corners"] = triangles
-    one, other = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    normals = np.cross(one, other)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    records["normal"] = normals / np.where(lengths > 0, lengths, 1.0)
-    return bytes(80) + struct.pack("<I", len(triangles)) + records.tobytes()
+    return f"{mesh}_{given[:60]}.stl", binary_stl(np.asarray(model.mesh_vert[vertices])[faces])
 
 
 def _rgba(model: Model, geom: int) -> Floats:
@@ -349,7 +317,9 @@ def inertial(link: Element, model: Model, body: int, shift: Floats) -> None:
     if mass <= 0:
         return
     element = SubElement(link, "inertial")
-    origin(element, shift @ pose_of(model.body_ipos[body], model.body_iquat[body]))
+    SubElement(
+        element, "origin", origin_of(shift @ pose_of(model.body_ipos[body], model.body_iquat[body]))
+    )
     SubElement(element, "mass", value=text(mass))
     xx, yy, zz = map(text, model.body_inertia[body])
     SubElement(element, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import posixpath
 import re
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
@@ -191,6 +192,19 @@ def has_volume(corners: Floats) -> bool:
     spread = corners - corners.mean(axis=0)
     _, directions = np.linalg.eigh(spread.T @ spread)
     return bool(np.ptp(spread @ directions[:, 0]) >= SMALLEST)
+
+
+def binary_stl(triangles: Floats) -> bytes:
+    """Return triangles, (n, 3, 3) (m), as a binary STL; the normal of one without area is 0."""
+    import numpy as np
+
+    kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    records = np.zeros(len(triangles), kind)
+    records["corners"] = triangles
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    records["normal"] = normals / np.where(lengths > 0, lengths, 1.0)
+    return bytes(80) + struct.pack("<I", len(triangles)) + records.tobytes()
 
 
 def _read(path: str, where: str) -> bytes:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import math
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, tostring
 
@@ -17,10 +18,20 @@ from robot_layouts.core.errors import AssetError
 from robot_layouts.kinematics.rotations import Floats, rpy_pose
 from robots.urdf.checks import expect_drivable, expect_readable, sizes_of
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel, UrdfShape
-from robots.urdf.summary import parse_urdf
+from robots.urdf.summary import parse_urdf, read_urdf
 from robots.urdf.text import numbers_of
 
 UNREAD = ("visual", "collision", "calibration", "safety_controller")  # what it need not read
+
+
+def model_of(urdf: Path) -> UrdfModel:
+    """Return the tree that a URDF on this machine describes, repaired where it is clear how.
+
+    Raises:
+        AssetError: As `robots.urdf.summary.read_urdf` and `read_model`.
+        MissingPackageError: If it is a template and xacro is not installed.
+    """
+    return read_model(read_urdf(urdf), urdf.as_posix())
 
 
 @lru_cache(maxsize=64)

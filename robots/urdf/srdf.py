@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 from robot_layouts.core.errors import AssetError, UnknownNameError
 from robots.urdf.model import UrdfModel
-from robots.urdf.summary import parse_urdf, read_urdf
+from robots.urdf.summary import root_of
 from robots.urdf.text import numbers_of
 
 
@@ -100,7 +100,7 @@ def read_semantics(srdf: Path, model: UrdfModel) -> Semantics:
             that contain themselves.
         UnknownNameError: If a group, a chain or a state names what does not exist.
     """
-    root = parse_urdf(read_urdf(srdf), str(srdf))
+    root = root_of(srdf)
     reading = _SrdfReading(root, model, srdf)
     return Semantics(
         groups={name: reading.group(name) for name in reading.elements},
@@ -177,7 +177,7 @@ def read_excluded_pairs(urdf: Path) -> tuple[ExcludedPair, ...]:
         AssetError: If the file cannot be read or is no SRDF, or a pair lacks a link.
     """
     srdf = srdf_beside(urdf)
-    return () if srdf is None else _excluded(parse_urdf(read_urdf(srdf), str(srdf)), srdf)
+    return () if srdf is None else _excluded(root_of(srdf), srdf)
 
 
 def _excluded(root: Element, srdf: Path) -> tuple[ExcludedPair, ...]:

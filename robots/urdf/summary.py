@@ -167,6 +167,16 @@ def _named_files(xml: bytes, urdf: str) -> dict[str, set[str]]:
     return found
 
 
+def root_of(urdf: Path) -> ElementTree.Element:
+    """Return the ``<robot>`` element of a URDF, repaired where it is clear how, or of an SRDF.
+
+    Raises:
+        AssetError: As `read_urdf` and `parse_urdf`.
+        MissingPackageError: As `read_urdf`.
+    """
+    return parse_urdf(read_urdf(urdf), urdf.as_posix())
+
+
 def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
     """Return the ``<robot>`` element of a URDF.
 

@@ -4,33 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.kinematics.tree import Tree
-from robots.parts import Vector3
+from robots.descriptor import RobotDescriptor
+from robots.parts import Limb, Vector3
 from robots.urdf.tree import link_index
-
-
-class HasTcp(Protocol):
-    """A robot or a limb; see `robots.RobotDescriptor` for the fields."""
-
-    @property
-    def tcp_link(self) -> str:
-        """Link that orients the tool centre point."""
-        ...
-
-    @property
-    def tcp_position_links(self) -> tuple[str, ...]:
-        """Links whose mean origin it is; ``tcp_link`` if empty."""
-        ...
-
-    @property
-    def tcp_offset(self) -> Vector3:
-        """From there to it (m)."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +43,7 @@ class Tcp:
         return origins + poses[:, self.turned, :3, :3] @ self.offset
 
 
-def find_tcp(robot: HasTcp, tree: Tree) -> Tcp:
+def find_tcp(robot: RobotDescriptor | Limb, tree: Tree) -> Tcp:
     """Return the tool centre point of a robot or a limb on a tree that has its links.
 
     Raises:
@@ -72,7 +53,7 @@ def find_tcp(robot: HasTcp, tree: Tree) -> Tcp:
 
 
 def place_tcp(tree: Tree, link: str, links: Sequence[str], offset: Vector3) -> Tcp:
-    """Return a tool centre point on a tree; see `HasTcp` for what describes it.
+    """Return a tool centre point on a tree; see `robots.RobotDescriptor` for what describes it.
 
     Args:
         tree: The links.

@@ -60,11 +60,7 @@ def parse_xml(xml: bytes, file: str, kind: str) -> Element:
 
 
 def numbers_of(
-    element: Element | None,
-    attribute: str,
-    default: tuple[float, ...],
-    where: str,
-    largest: float | None = None,
+    element: Element | None, attribute: str, default: tuple[float, ...], where: str
 ) -> Any:
     """Return the finite numbers of an attribute, as many as ``default`` has.
 
@@ -73,8 +69,6 @@ def numbers_of(
         attribute: Its attribute.
         default: What it means to leave the attribute out.
         where: What the element belongs to, for messages.
-        largest: The largest amount of a number; None is `LARGEST_LENGTH` for ``xyz``, else
-            `LARGEST`.
 
     Raises:
         AssetError: If there are more or fewer numbers, or some word is no number, or one that is
@@ -82,13 +76,21 @@ def numbers_of(
     """
     if element is None or element.get(attribute) is None:
         return default
-    return required_numbers(element, attribute, len(default), where, largest)
+    return required_numbers(element, attribute, len(default), where)
 
 
 def required_numbers(
     element: Element, attribute: str, count: int, where: str, largest: float | None = None
 ) -> tuple[float, ...]:
     """Return the numbers of an attribute that cannot be left out; see `numbers_of`.
+
+    Args:
+        element: The element.
+        attribute: Its attribute.
+        count: How many numbers it has.
+        where: What the element belongs to, for messages.
+        largest: The largest amount of a number; None is `LARGEST_LENGTH` for ``xyz``, else
+            `LARGEST`.
 
     Raises:
         AssetError: If it is left out, or as `numbers_of`.

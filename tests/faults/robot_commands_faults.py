@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from unittest import mock
 
-from robots import RobotRegistry, write_manifest
+from robots import RobotRegistry
 from robots.assets.store import AssetStore
 from robots.fetch_assets import main as fetch_assets
 from robots.fetch_assets import robot_files
@@ -61,14 +61,12 @@ WRONG_WORDS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
     "from_urdf of ~nobody": (from_urdf, ("~nobody_here/x.urdf",)),
     "from_urdf of a name of 5000 letters": (from_urdf, ("x" * 5000 + ".urdf",)),
     "from_urdf of an unknown description": (from_urdf, ("pandaa_description",)),
-    "write_manifest with a word": (write_manifest.main, ("now",)),
 }
 COMMANDS = {
     "fetch_assets": "robots.fetch_assets koch --physics-only --source mani_skill",
     "fetch_assets --check": "robots.fetch_assets koch --check",
     "inspect": "robots.inspect panda",
     "from_urdf": f"robots.from_urdf {CHECKOUT}/nothing.urdf",
-    "write_manifest": "robots.write_manifest --check",
 }
 # How a shell runs a command, and whether its exit code is still that of the command.
 STREAMS = {
@@ -95,8 +93,6 @@ def faults() -> Iterator[Fault]:
     for signal_ in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
         yield Fault(AREA, f"fetch_assets: {signal_.name}", _interrupted(signal_), GOES_ON)
     yield Fault(AREA, "fetch_assets: 5 processes at once", _at_once, GOES_ON)
-    yield Fault(AREA, "write_manifest where nobody may write", _unwritable)
-    yield Fault(AREA, "write_manifest where the disk is full", _full_disk, GOES_ON)
 
 
 def _refuse(folder: Path, main: Callable[..., int], words: tuple[str, ...]) -> None:
@@ -129,7 +125,6 @@ def _in_shell(line: str, command: str) -> Callable[[Path], str]:
         assert "Traceback" not in printed, printed[-2000:]
         assert "Exception ignored" not in printed, printed[-2000:]
         expected = 1 if "nothing.urdf" in command or "--check" in command else 0
-        expected = 0 if "write_manifest" in command else expected
         assert code == expected, (code, printed[-2000:])
         if "--source" in command:
             assert _complete(folder / "assets")
@@ -221,30 +216,3 @@ def _at_once(folder: Path) -> None:
     printed = [process.communicate(timeout=SECONDS)[0] for process in processes]
     assert [process.returncode for process in processes] == [0] * 5, printed
     assert _complete(folder / "assets")
-
-
-def _unwritable(folder: Path) -> None:
-    with mock.patch.object(write_manifest, "CHECKOUT_CACHE", Path("/proc/nowhere")):
-        run_main(write_manifest.main)
-
-
-def _full_disk(folder: Path) -> str:
-    """Write the manifest in a process that may write no large file."""
-    (folder / "manifest.json").write_text("the one before")
-    script = (
-        "import sys; from pathlib import Path; from robots import write_manifest as w\n"
-        "w.CHECKOUT_CACHE = Path(sys.argv[1]); sys.exit(w.main([]))"
-    )
-    line = f'ulimit -f 4; exec {shlex.quote(sys.executable)} -c "$0" "$1"'
-    done = subprocess.run(
-        ["bash", "-c", line, script, folder],
-        cwd=CHECKOUT,
-        env=_environment(folder),
-        capture_output=True,
-        text=True,
-        timeout=SECONDS,
-    )
-    assert done.returncode == 1, done
-    assert done.stderr.startswith("error: cannot write ")
-    assert (folder / "manifest.json").read_text() == "the one before"
-    return "one clear error, and the manifest before stays"

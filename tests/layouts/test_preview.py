@@ -163,7 +163,7 @@ def test_the_table_is_drawn_under_the_robots(tmp_path):
 
 @pytest.mark.parametrize("table", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, math.nan, 1)])
 def test_a_table_that_is_no_rectangle(table, tmp_path):
-    with pytest.raises(LayoutError, match="it must be x_min, y_min, x_max, y_max"):
+    with pytest.raises(LayoutError, match="must be x_min, y_min, x_max, y_max|takes 4 finite"):
         LAYOUTS["two"].preview(tmp_path / "cell.png", table=table)
 
 

@@ -381,7 +381,7 @@ class TestTable:
 
     @pytest.mark.parametrize("table", [(1, 0, 0, 1), (0, 0, 1, math.nan)])
     def test_one_that_is_no_rectangle_is_refused(self, table):
-        with pytest.raises(LayoutError, match="it must be x_min, y_min, x_max, y_max"):
+        with pytest.raises(LayoutError, match="must be x_min, y_min, x_max, y_max|takes 4 finite"):
             self.validate(table)
 
 

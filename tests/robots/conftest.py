@@ -13,7 +13,7 @@ from robot_layouts.core.paths import default_root
 from robots.assets import sources as asset_sources
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import SourceError, find_package
-from robots.assets.store import AssetStore
+from robots.assets.store import AssetStore, FileState
 from tests.robots.hub_server import HubServer
 
 REAL_ROOT = default_root()
@@ -23,7 +23,7 @@ PANDA = load_manifest().package("maniskill_panda")
 def contents(file: AssetFile) -> bytes:
     """Return a robot file from the local copy or an installed mani_skill."""
     store = AssetStore(REAL_ROOT)
-    if store.state(file).usable:
+    if store.state(file) is FileState.VERIFIED:
         return store.path(file).read_bytes()
     return (find_package("mani_skill") / file.origin.folder / file.path).read_bytes()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 from pathlib import Path
 
@@ -130,44 +129,6 @@ def test_one_error_names_every_source_and_what_to_do(store, physics):
     assert text.count(": missing") == len(physics)
 
 
-def test_trust_accepts_marks_and_is_remembered(store, physics, capfd):
-    mesh = physics[0]
-    source = FakeSource({**right(physics), mesh.path: b"my own mesh"})
-    ensure(physics, store, [source], trust=True)
-    assert store.state(mesh) is FileState.TRUSTED
-    assert [store.state(file) for file in physics[1:]] == [FileState.VERIFIED] * (len(physics) - 1)
-    record = json.loads((store.root / "fetched.json").read_text())
-    assert record[str(mesh)] == {
-        "source": "fake source",
-        "sha256": hashlib.sha256(b"my own mesh").hexdigest(),
-        "trusted": True,
-    }
-    assert UrdfLocator("maniskill_panda", "panda_v2.urdf").locate().is_file()
-
-
-def test_trust_holds_for_the_accepted_bytes_alone(store, physics):
-    mesh = physics[0]
-    source = FakeSource({**right(physics), mesh.path: b"my own mesh"})
-    ensure(physics, store, [source], trust=True)
-    store.path(mesh).write_bytes(b"my own mess")
-    assert store.state(mesh) is FileState.WRONG
-
-
-def test_trust_refuses_a_urdf_that_needs_unknown_files(store, physics):
-    urdf = next(file for file in physics if file.path == "panda_v2.urdf")
-    changed = contents(urdf).replace(b"collision/link3.stl", b"collision/other.stl")
-    source = FakeSource({**right(physics), urdf.path: changed})
-    with pytest.raises(AssetError, match=r"files outside the manifest: .*collision/other\.stl"):
-        ensure(physics, store, [source], trust=True)
-    assert store.state(urdf) is FileState.MISSING
-
-
-def test_trust_refuses_a_urdf_that_is_none(store, physics):
-    source = FakeSource({**right(physics), "panda_v2.urdf": b"<html>Not found</html>"})
-    with pytest.raises(AssetError, match="fake source: cannot be trusted: panda_v2.urdf is not a"):
-        ensure(physics, store, [source], trust=True)
-
-
 def test_a_local_copy_gives_only_verified_files(store, physics, fill, tmp_path):
     elsewhere = AssetStore(tmp_path / "elsewhere")
     fill(elsewhere, physics)
@@ -215,31 +176,6 @@ def test_a_complete_read_only_copy_is_enough(store, physics, fill, monkeypatch):
     for name in ("mkdir", "replace", "rename", "unlink"):
         monkeypatch.setattr(f"os.{name}", refuse)
     ensure(physics, store, [])
-
-
-DAMAGED_RECORDS = {
-    "half": "{",
-    "null": "null",
-    "a list": "[]",
-    "nested deeply": "[" * 100_000,
-    "an entry that is a string": '{"a/b.stl": "mesh"}',
-    "an entry without sha256": '{"a/b.stl": {"source": "x", "trusted": true}}',
-    "a key twice": '{"a": {}, "a": {}}',
-}
-
-
-@pytest.mark.parametrize("damage", DAMAGED_RECORDS)
-def test_a_damaged_record_is_written_anew_and_loses_nothing(store, physics, fill, capfd, damage):
-    fill(store, physics)
-    record = store.root / "fetched.json"
-    record.write_text(DAMAGED_RECORDS[damage])
-    assert store.unusable(physics) == []
-    store.path(physics[0]).write_bytes(b"damaged")
-    assert store.unusable(physics) == [physics[0]]
-    ensure(physics, store, [FakeSource(right(physics))])
-    assert store.unusable(physics) == []
-    assert capfd.readouterr().err.count(f"{record} is damaged: ") == 1
-    assert list(json.loads(record.read_text())) == [str(physics[0])]
 
 
 def test_the_local_copy_is_where_it_is_said_to_be(monkeypatch, tmp_path):

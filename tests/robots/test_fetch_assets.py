@@ -11,7 +11,7 @@ import pytest
 
 from robots import RobotRegistry
 from robots.assets.manifest import load_manifest
-from robots.assets.store import AssetStore, FileState
+from robots.assets.store import AssetStore
 from robots.fetch_assets import main
 from tests.catalogue import is_optional
 
@@ -102,29 +102,14 @@ def test_the_local_source_alone_tells_what_it_lacks(store, capsys):
     assert f"local copy {store.root}: lacks 11 files" in said
 
 
-def test_trusting_the_local_copy_marks_what_differs(store, physics, fill, capsys):
-    fill(store, physics)
-    mesh = next(file for file in physics if file.path == MESH)
-    store.path(mesh).write_bytes(b"my own mesh")
-    local = ["panda", "--physics-only", "--source", "local"]
-    assert main(local) == 1
-    assert main([*local, "--trust-source"]) == 0
-    assert store.state(mesh) is FileState.TRUSTED
-    assert store.path(mesh).read_bytes() == b"my own mesh"
-    assert f"differs from the manifest, trusted: {mesh}" in capsys.readouterr().out
-    assert main(["panda", "--physics-only", "--check"]) == 0
-
-
-def test_a_source_that_differs_is_trusted_only_when_asked(hub, store, physics, capsys):
+def test_a_source_that_differs_is_refused(hub, store, physics, capsys):
     hub.files[f"robots/maniskill_panda/{MESH}"] = b"another mesh"
     arguments = ["panda", "--physics-only", "--source", "hf"]
     assert main(arguments) == 1
     assert f"refused, as 1 files differ from the manifest, twice: maniskill_panda/{MESH}" in (
         capsys.readouterr().err
     )
-    assert main([*arguments, "--trust-source"]) == 0
-    assert store.unusable(physics) == []
-    assert f"trusted: maniskill_panda/{MESH}" in capsys.readouterr().out
+    assert [file.path for file in store.unusable(physics)] == [MESH]
 
 
 def test_the_revision_is_passed_on(hub, capsys):

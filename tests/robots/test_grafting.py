@@ -12,10 +12,10 @@ from layouts import face_to_face, single
 from robot_layouts.core.errors import UnwritableFileError
 from robot_layouts.kinematics.rotations import pose_matrix
 from robot_layouts.simulation import Simulation
-from robots import CameraMount, DescriptorError, RobotRegistry, UnknownNameError
+from robots import DescriptorError, RobotRegistry, UnknownNameError
 from robots.assets.assembled import AssembledUrdf, UrdfPart
 from robots.assets.locator import LocalUrdf
-from robots.grafting import Mount, on_body, with_camera, with_gripper, with_tool
+from robots.grafting import Mount, on_body, with_gripper, with_tool
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
@@ -175,12 +175,6 @@ class TestTools:
         third = with_tool(arm, pen, tcp_link="nib")
         assert third.tcp_link == "tool_2_nib"
         assert third.reach > arm.reach > PANDA.reach
-
-    def test_a_camera(self):
-        camera = CameraMount("wrist", "panda_hand")
-        assert with_camera(PANDA, camera).cameras == (camera,)
-        with pytest.raises(UnknownNameError, match="panda_hand"):
-            with_camera(PANDA, CameraMount("wrist", "panda_hnad"))
 
 
 def test_a_gripper_leaves_the_control_modes_of_its_arm_behind():

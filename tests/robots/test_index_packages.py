@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.manifest import build_manifest, build_package
 from robots import AssetError
 from robots.assets.fetching import ensure
 from robots.assets.manifest import AssetFile, PackageOrigin, load_manifest
 from robots.assets.packages import EXAMPLE_ROBOT_DATA, MANI_SKILL, find_package
 from robots.assets.sources import InstalledPackage, PackageWheel
 from robots.fetch_assets import main
-from robots.write_manifest import build_manifest, build_package
 from tests.robots.wheel_index import WheelIndex, without_pip_settings
 
 pytestmark = pytest.mark.usefixtures("store")
@@ -121,8 +121,8 @@ def test_what_is_not_installed_stays_in_the_manifest_as_it_was(monkeypatch):
             raise AssetError(f"{name} is not installed")
         return find_package(name)
 
-    monkeypatch.setattr("robots.write_manifest.SourceError", AssetError)
-    monkeypatch.setattr("robots.write_manifest.find_package", refuse)
+    monkeypatch.setattr("benchmarks.manifest.SourceError", AssetError)
+    monkeypatch.setattr("benchmarks.manifest.find_package", refuse)
     assert build_manifest() == load_manifest()
 
 

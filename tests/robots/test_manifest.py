@@ -9,12 +9,14 @@ from pathlib import Path, PurePosixPath
 
 import pytest
 
+from benchmarks import manifest as writer
+from benchmarks.__main__ import main
+from benchmarks.manifest import LARGEST_FILE, build_package, to_json
 from robot_layouts.core.paths import CHECKOUT_CACHE
-from robots import AssetError, UnknownNameError, write_manifest
+from robots import AssetError, UnknownNameError
 from robots.assets import manifest
-from robots.assets.manifest import LARGEST_FILE, AssetManifest, load_manifest
+from robots.assets.manifest import AssetManifest, load_manifest
 from robots.assets.packages import find_package
-from robots.write_manifest import build_package
 
 
 @pytest.fixture
@@ -25,18 +27,18 @@ def _fresh_manifest():
 
 
 def test_the_manifest_survives_writing_and_reading():
-    assert AssetManifest.from_json(load_manifest().to_json()) == load_manifest()
+    assert AssetManifest.from_json(to_json(load_manifest())) == load_manifest()
 
 
 def test_the_tracked_manifest_is_what_mani_skill_holds(capsys):
-    assert write_manifest.main(["--check"]) == 0
+    assert main(["manifest", "--check"]) == 0
     assert "is up to date" in capsys.readouterr().out
 
 
 def test_a_stale_manifest_is_noticed_and_rewritten(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(write_manifest, "CHECKOUT_CACHE", tmp_path)
-    assert write_manifest.main(["--check"]) == 1
-    assert write_manifest.main([]) == 0
+    monkeypatch.setattr(writer, "CHECKOUT_CACHE", tmp_path)
+    assert main(["manifest", "--check"]) == 1
+    assert main(["manifest"]) == 0
     written = (tmp_path / "manifest.json").read_text()
     assert written == (CHECKOUT_CACHE / "manifest.json").read_text()
 
@@ -191,11 +193,11 @@ def test_the_check_notices_a_path_that_leads_elsewhere(path):
 
 def test_a_manifest_that_cannot_be_written_stays_as_it_was(tmp_path, monkeypatch, capsys):
     (tmp_path / "manifest.json").write_text("the one before")
-    monkeypatch.setattr(write_manifest, "CHECKOUT_CACHE", tmp_path)
+    monkeypatch.setattr(writer, "CHECKOUT_CACHE", tmp_path)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # bytes
     try:
-        assert write_manifest.main([]) == 1
+        assert main(["manifest"]) == 2
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert [path.name for path in tmp_path.iterdir()] == ["manifest.json"]

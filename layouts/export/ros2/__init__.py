@@ -7,10 +7,8 @@ import re
 from collections.abc import Iterator, Mapping
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, indent, tostring
-
-import yaml
 
 from layouts.export.cell import ExportedCell
 from layouts.export.files import LICENCES, licence_note, replaced_folder, short_licences
@@ -23,11 +21,13 @@ from robots.bodies.allowed import joined_pairs, rigid_groups, rigid_pairs
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement
 
-BROADCASTER = "joint_state_broadcaster"
-RATE = 100  # Hz
-ACCELERATION = 2.0  # 1/s; times the largest speed: half a second to reach it
-SCALING = 0.1  # of speeds and accelerations, unless a request asks for more
-PLANNER = "RRTConnectkConfigDefault"
+CONFIGS = (
+    "joint_limits",
+    "kinematics",
+    "moveit_controllers",
+    "ompl_planning",
+    "ros2_controllers",
+)
 ENTRIES = ("CMakeLists.txt", LICENCES, "config", "launch", "meshes", "package.xml", "urdf")
 
 
@@ -69,21 +69,17 @@ def _write(folder: Path, cell: ExportedCell, package: str, *, visuals: bool) -> 
         "package": package,
         "licences": LICENCES,
         "licence_names": short_licences(robots),
-        "controllers": [BROADCASTER, *(group.controller for group in groups.own)],
         "names": names,
         "groups": groups,
         "robots": cell.robots,
+        "speeds": dict(_speeds(cell, names)),
         "disabled": [*_allowed_pairs(cell, names), *_pairs_on_tables(cell, names)],
     }
     texts = {
         f"urdf/{package}.urdf": _xml(description(cell, names, package, meshes, visuals=visuals)),
         f"urdf/{package}.urdf.xacro": _filled("cell.urdf.xacro", content),
         f"config/{package}.srdf": _filled("cell.srdf", content),
-        "config/joint_limits.yaml": _yaml(_joint_limits(cell, names)),
-        "config/kinematics.yaml": _yaml(_kinematics(groups)),
-        "config/ompl_planning.yaml": _yaml(_ompl_planning(groups)),
-        "config/ros2_controllers.yaml": _yaml(_controllers(groups)),
-        "config/moveit_controllers.yaml": _yaml(_moveit_controllers(groups)),
+        **{f"config/{name}.yaml": _filled(f"{name}.yaml", content) for name in CONFIGS},
         "launch/demo.launch.py": _filled("demo.launch.py", content),
         "package.xml": _filled("package.xml", content),
         "CMakeLists.txt": _filled("CMakeLists.txt", content),
@@ -117,103 +113,18 @@ def _pairs_on_tables(cell: ExportedCell, names: RosNames) -> Iterator[tuple[str,
                 yield names.frames[table], names.link(place, link), "Never"
 
 
+def _speeds(cell: ExportedCell, names: RosNames) -> Iterator[tuple[str, float]]:
+    """Yield the largest speed of each joint that follows none, by its name (rad/s, m/s)."""
+    for place, standing in cell.robots.items():
+        joints = {joint.name: joint for joint in standing.source.model.moving}
+        for joint in standing.source.leaders:
+            yield names.joint(place, joint), float(speed_of(joints[joint]))
+
+
 def _filled(template: str, content: Mapping[str, object]) -> str:
-    return f"{fragment(f'layouts.export.ros2/{template}.jinja', **content)}\n"
+    return f"{fragment(f'layouts.export.ros2/{template}.jinja', **content).rstrip()}\n"
 
 
 def _xml(root: Element) -> str:
     indent(root)
     return f'<?xml version="1.0"?>\n{tostring(root, encoding="unicode")}\n'
-
-
-def _yaml(value: dict[str, object]) -> str:
-    return yaml.safe_dump(value, sort_keys=False, default_flow_style=False)
-
-
-# -- controllers, and MoveIt ---------------------------------------------------------------
-
-
-def _controllers(groups: PlanningGroups) -> dict[str, Any]:
-    """Return the controllers, one for each group that has joints of its own."""
-    kinds = {BROADCASTER: {"type": f"{BROADCASTER}/JointStateBroadcaster"}}
-    own: dict[str, Any] = {}
-    for group in groups.own:
-        kind = "joint_trajectory_controller/JointTrajectoryController"
-        kinds[group.controller] = {"type": kind}
-        own[group.controller] = {
-            "ros__parameters": {
-                "joints": groups.joints(group),
-                "command_interfaces": ["position"],
-                "state_interfaces": ["position", "velocity"],
-            }
-        }
-    manager = {"ros__parameters": {"update_rate": RATE, **kinds}}
-    return {"controller_manager": manager, **own}
-
-
-def _moveit_controllers(groups: PlanningGroups) -> dict[str, Any]:
-    """Return which controller MoveIt sends the trajectories of which joints."""
-    manager = "moveit_simple_controller_manager"
-    own: dict[str, Any] = {
-        group.controller: {
-            "type": "FollowJointTrajectory",
-            "action_ns": "follow_joint_trajectory",
-            "default": True,
-            "joints": groups.joints(group),
-        }
-        for group in groups.own
-    }
-    return {
-        "moveit_controller_manager": f"{manager}/MoveItSimpleControllerManager",
-        manager: {"controller_names": list(own), **own},
-    }
-
-
-def _joint_limits(cell: ExportedCell, names: RosNames) -> dict[str, Any]:
-    """Return speeds and accelerations of all joints that follow none."""
-    limits: dict[str, Any] = {}
-    for place, standing in cell.robots.items():
-        joints = {joint.name: joint for joint in standing.source.model.moving}
-        for joint in standing.source.leaders:
-            speed = float(speed_of(joints[joint]))
-            limits[names.joint(place, joint)] = {
-                "has_velocity_limits": True,
-                "max_velocity": speed,
-                "has_acceleration_limits": True,
-                "max_acceleration": ACCELERATION * speed,
-            }
-    return {
-        "default_velocity_scaling_factor": SCALING,
-        "default_acceleration_scaling_factor": SCALING,
-        "joint_limits": limits,
-    }
-
-
-def _kinematics(groups: PlanningGroups) -> dict[str, Any]:
-    """Return the solver of each group that is a chain."""
-    return {
-        group.name: {
-            "kinematics_solver": "kdl_kinematics_plugin/KDLKinematicsPlugin",
-            "kinematics_solver_search_resolution": 0.005,
-            "kinematics_solver_timeout": 0.05,
-        }
-        for group in groups.own
-        if group.chain is not None
-    }
-
-
-def _ompl_planning(groups: PlanningGroups) -> dict[str, Any]:
-    """Return the planning pipeline, and the planners of each group."""
-    requests = ("ResolveConstraintFrames", "ValidateWorkspaceBounds", "CheckStartStateBounds",
-                "CheckStartStateCollision")  # fmt: skip
-    responses = ("AddTimeOptimalParameterization", "ValidateSolution", "DisplayMotionPath")
-    return {
-        "planning_plugins": ["ompl_interface/OMPLPlanner"],
-        "request_adapters": [f"default_planning_request_adapters/{name}" for name in requests],
-        "response_adapters": [f"default_planning_response_adapters/{name}" for name in responses],
-        "planner_configs": {PLANNER: {"type": "geometric::RRTConnect", "range": 0.0}},
-        **{
-            group.name: {"default_planner_config": PLANNER, "planner_configs": [PLANNER]}
-            for group in (*groups.own, *groups.made)
-        },
-    }

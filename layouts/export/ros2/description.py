@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
@@ -10,9 +10,9 @@ from layouts.export.cell import ExportedCell, RobotSource, Standing
 from layouts.export.meshes import MeshFolder, drawn_meshes, solid_shapes
 from layouts.export.ros2.groups import WORLD, RosNames
 from layouts.visuals import GREY, Rgba
-from robot_layouts.kinematics.quaternions import quaternion_rpy
-from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix
 from robots.urdf.model import LinkInertia, ModelJoint
+from robots.urdf.writing import joint_element, origin_of, text
 
 SPEEDS = {"rad": 1.0, "m": 0.1}  # per second, of joints whose URDF has no largest speed
 
@@ -44,24 +44,9 @@ def description(
         link = names.tool(tool)
         SubElement(root, "link", name=link)
         pose = pose_matrix(tool.position, (1.0, 0.0, 0.0, 0.0))
-        root.append(fixed(names.fixed_joint(link), names.link(tool.place, tool.link), link, pose))
+        carrier = names.link(tool.place, tool.link)
+        root.append(joint_element(names.fixed_joint(link), "fixed", carrier, link, origin_of(pose)))
     return root
-
-
-def fixed(name: str, parent: str, child: str, pose: Floats) -> Element:
-    """Return a fixed joint.
-
-    Args:
-        name: Its name.
-        parent: The link that carries it.
-        child: The link that it carries.
-        pose: Of that one in the frame of the other, (4, 4) (m).
-    """
-    joint = Element("joint", name=name, type="fixed")
-    SubElement(joint, "parent", link=parent)
-    SubElement(joint, "child", link=child)
-    SubElement(joint, "origin", _origin(pose))
-    return joint
 
 
 def speed_of(joint: ModelJoint) -> float:
@@ -78,18 +63,19 @@ def _frames(cell: ExportedCell, names: RosNames) -> Iterator[Element]:
             middle, size = cell.tables[name]
             own = inverse_pose(pose) @ middle
             for kind in ("visual", "collision"):
-                shape = _shape(kind, own, "box", size=_text(size.tolist()))
+                shape = _shape(kind, own, "box", size=text(*size.tolist()))
                 if kind == "visual":
                     _paint(shape, names.frames[name], GREY)
                 link.append(shape)
         yield link
-        yield fixed(names.fixed_joint(names.frames[name]), WORLD, names.frames[name], pose)
+        made = names.frames[name]
+        yield joint_element(names.fixed_joint(made), "fixed", WORLD, made, origin_of(pose))
 
 
 def _robot(standing: Standing, names: RosNames, shapes: Shapes) -> Iterator[Element]:
     source, place = standing.source, standing.place
     root = names.link(place, source.model.root)
-    yield fixed(names.fixed_joint(root), WORLD, root, standing.base)
+    yield joint_element(names.fixed_joint(root), "fixed", WORLD, root, origin_of(standing.base))
     for name in source.model.links:
         link = Element("link", name=names.link(place, name))
         if name in source.inertials:
@@ -102,17 +88,17 @@ def _robot(standing: Standing, names: RosNames, shapes: Shapes) -> Iterator[Elem
 
 
 def _joint(
-    text: Element, joint: ModelJoint, source: RobotSource, place: str, names: RosNames
+    element: Element, joint: ModelJoint, source: RobotSource, place: str, names: RosNames
 ) -> Element:
     made = Element("joint", name=names.joint(place, joint.name), type=joint.type)
     SubElement(made, "parent", link=names.link(place, joint.parent))
     SubElement(made, "child", link=names.link(place, joint.child))
-    origin = text.find("origin")
+    origin = element.find("origin")
     if origin is not None:
         SubElement(made, "origin", origin.attrib)
     if not joint.moves:
         return made
-    SubElement(made, "axis", xyz=_text(joint.axis))
+    SubElement(made, "axis", xyz=text(*joint.axis))
     SubElement(made, "limit", _limit(joint, source))
     if joint.name in source.dynamics:
         damping, friction = source.dynamics[joint.name]
@@ -135,7 +121,7 @@ def _limit(joint: ModelJoint, source: RobotSource) -> dict[str, str]:
 
 def _inertial(inertial: LinkInertia) -> Element:
     made = Element("inertial")
-    SubElement(made, "origin", xyz=_text(inertial.origin[:3, 3].tolist()), rpy="0 0 0")
+    SubElement(made, "origin", xyz=text(*inertial.origin[:3, 3].tolist()), rpy="0 0 0")
     SubElement(made, "mass", value=repr(inertial.mass))
     keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
     numbers = inertial.tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
@@ -160,7 +146,7 @@ def _shapes(source: RobotSource, meshes: Path, uri: str, *, visuals: bool) -> Sh
                 file = files.save(solid.hull, f"{link}_collision")
                 shapes[link].append(_mesh("collision", f"{uri}/{source.name}/{file}"))
             elif own.kind == "box":
-                shapes[link].append(_shape("collision", own.origin, "box", size=_text(own.sizes)))
+                shapes[link].append(_shape("collision", own.origin, "box", size=text(*own.sizes)))
             else:
                 keys = ("radius", "length")[: len(own.sizes)]
                 sizes = {key: repr(float(x)) for key, x in zip(keys, own.sizes, strict=True)}
@@ -176,20 +162,11 @@ def _mesh(kind: str, uri: str) -> Element:
 
 def _shape(kind: str, pose: Floats, geometry: str, **sizes: str) -> Element:
     shape = Element(kind)
-    SubElement(shape, "origin", _origin(pose))
+    SubElement(shape, "origin", origin_of(pose))
     SubElement(SubElement(shape, "geometry"), geometry, sizes)
     return shape
 
 
 def _paint(shape: Element, name: str, rgba: Rgba) -> None:
     material = SubElement(shape, "material", name=name)
-    SubElement(material, "color", rgba=_text(rgba))
-
-
-def _origin(pose: Floats) -> dict[str, str]:
-    w, x, y, z = quaternion_of(pose[:3, :3]).tolist()
-    return {"xyz": _text(pose[:3, 3].tolist()), "rpy": _text(quaternion_rpy((w, x, y, z)))}
-
-
-def _text(values: Sequence[float]) -> str:
-    return " ".join(repr(float(value)) for value in values)
+    SubElement(material, "color", rgba=text(*rgba))

@@ -17,7 +17,7 @@ from robots.urdf.checks import (
     SMALLEST,
     SMALLEST_SIZE,
     attributes_of,
-    expect_inertia,
+    inertia_problems,
     moved_links,
     sizes_of,
 )
@@ -142,10 +142,9 @@ def repair_inertia(root: Element, urdf: str) -> Iterator[str]:
 
 def _is_possible(link: Element, where: str, *, moves: bool) -> bool:
     try:
-        expect_inertia(link, where, moves=moves)
+        return not any(inertia_problems(link, where, moves=moves))
     except AssetError:
         return False
-    return True
 
 
 def _repair(link: Element, where: str, urdf: str) -> Iterator[str]:

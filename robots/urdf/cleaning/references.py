@@ -14,13 +14,7 @@ from xml.etree.ElementTree import Element
 
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import read_regular
-from robots.urdf.paths import (
-    DEEPEST_PACKAGE,
-    is_workspace,
-    opened_folders,
-    parents,
-    resolve,
-)
+from robots.urdf.paths import DEEPEST_PACKAGE, is_workspace, opened_folders, parents, resolve
 from robots.urdf.text import parse_xml
 
 MAX_PACKAGE_BYTES = 1 << 20  # of a package.xml

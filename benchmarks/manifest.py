@@ -1,17 +1,17 @@
-"""``robot-layouts robots manifest``: rewrites ``assets_cache/manifest.json`` from packages."""
+"""``python -m benchmarks manifest``: rewrites ``assets_cache/manifest.json`` from packages."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import posixpath
 import re
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
-from robot_layouts.core.cli import main_of
-from robot_layouts.core.commands import start
 from robot_layouts.core.errors import AssetError
 from robot_layouts.core.files import read_regular, read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
@@ -19,7 +19,6 @@ from robot_layouts.core.writing import write_whole
 from robots.assets import scenery
 from robots.assets.locator import UrdfLocator
 from robots.assets.manifest import (
-    LARGEST_FILE,
     AssetFile,
     AssetManifest,
     AssetPackage,
@@ -36,6 +35,7 @@ from robots.assets.packages import (
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import UrdfReferences, read_references
 
+LARGEST_FILE = 2**28  # bytes
 ALL_ROBOTS = "robots"  # maniskill_robots: for a URDF that uses files of several robots' folders
 LICENCE_FILES = ("LICENSE", "LICENSE.txt")
 README = "README.md"
@@ -51,7 +51,7 @@ TERMS = {
 }
 
 
-def write_manifest(*, check: bool = False) -> int:
+def manifest(*, check: bool = False) -> int:
     """Write the manifest of robot files from installed packages, when a robot is added.
 
     Args:
@@ -61,10 +61,10 @@ def write_manifest(*, check: bool = False) -> int:
         RobotLayoutsError: If a package cannot be read, or the manifest not be written.
     """
     path = CHECKOUT_CACHE / "manifest.json"
-    text = build_manifest().to_json()
+    text = to_json(build_manifest())
     if check:
         fresh = path.is_file() and read_text(path, LARGEST_FILE) == text
-        print(f"{path} is {'up to date' if fresh else 'stale; run robot-layouts robots manifest'}")
+        print(f"{path} is {'up to date' if fresh else 'stale; run python -m benchmarks manifest'}")
         return 0 if fresh else 1
     write_whole(path, text, AssetError)
     print(f"wrote {path}")
@@ -89,6 +89,27 @@ def build_manifest() -> AssetManifest:
     packages = {name: _build_or_keep(name, urdfs[name]) for name in urdfs}
     scenes = build_scenery(find_package(MANI_SKILL.name))
     return AssetManifest({**packages, scenery.PACKAGE: scenes})
+
+
+def to_json(manifest: AssetManifest) -> str:
+    """Return a manifest as it is kept in the repository."""
+    packages = {name: _package(manifest.packages[name]) for name in sorted(manifest.packages)}
+    return json.dumps({"packages": packages}, indent=1) + "\n"
+
+
+def _package(package: AssetPackage) -> dict[str, Any]:
+    origin = {key: value for key, value in vars(package.origin).items() if key != "name" and value}
+    files = {
+        file.path: {
+            "bytes": file.bytes,
+            "sha256": file.sha256,
+            "physics": list(file.physics),
+            "pictures": list(file.pictures),
+        }
+        for file in sorted(package.files, key=lambda file: file.path)
+    }
+    undrawable = {"undrawable": list(package.undrawable)} if package.undrawable else {}
+    return {**origin, **undrawable, "files": files}
 
 
 def _build_or_keep(name: str, urdfs: set[str]) -> AssetPackage:
@@ -198,7 +219,7 @@ def _licence(folder: Path) -> tuple[str, str, str]:
             if file != README or name:
                 raise AssetError(
                     f"{folder / file} is a licence this command does not know; tell it in"
-                    " write_manifest.py"
+                    " benchmarks/manifest.py"
                 )
     if "mani_skill" in folder.parts:
         return "CC BY-NC 4.0", TERMS["CC BY-NC 4.0"], ""
@@ -274,9 +295,3 @@ def _asset_file(
         tuple(sorted(physics)),
         tuple(sorted(pictures)),
     )
-
-
-main = main_of(write_manifest, "robots manifest")
-
-if __name__ == "__main__":
-    start(main)
