@@ -12,13 +12,13 @@ from robot_layouts.core.module_names import missing_name
 if TYPE_CHECKING:
     from robot_layouts.data.evaluation import Evaluation, Score, evaluate
     from robot_layouts.data.recording.record import record
-    from robot_layouts.data.view import view
+    from robot_layouts.data.viewing import view
 
 __all__ = ["Evaluation", "Score", "evaluate", "record", "view"]
 
 _HOMES = {
     "record": "robot_layouts.data.recording.record",
-    "view": "robot_layouts.data.view",
+    "view": "robot_layouts.data.viewing",
 }
 
 

@@ -96,7 +96,7 @@ def view(recording: RecordingOption, *, episode: int = 0, page: Page) -> None:
     Raises:
         RobotLayoutsError: If the recording cannot be shown.
     """
-    from robot_layouts.data.view import episode_cell
+    from robot_layouts.data.viewing import episode_cell
 
     with recording.open() as file:
         cell = recording.cell.making()

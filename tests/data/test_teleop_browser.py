@@ -90,7 +90,7 @@ def test_two_robot_pick_cube_is_solved_by_hand(tmp_path):
 
 def test_a_task_from_outside_is_solved_by_hand(tmp_path, monkeypatch):
     tutorials = Path(__file__).parents[2] / "docs/tutorials"
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tutorials), os.environ["PYTHONPATH"]]))
+    monkeypatch.setenv("PYTHONPATH", str(tutorials), prepend=os.pathsep)
     monkeypatch.syspath_prepend(str(tutorials))
     with hands_on("tray:TwoArmTray-v1", tmp_path) as (hands, model):
         tray = pose_of(model, "tray")[:3]

@@ -11,7 +11,7 @@ from benchmarks.teleop import served
 from robot_layouts.__main__ import main
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.view import episode_cell
+from robot_layouts.data.viewing import episode_cell
 from tests.data.recordings import LEFT_KEY, TWO_ROBOTS, edited, read, record
 from tests.pages import browser_page, changed, settled
 
@@ -91,11 +91,12 @@ def test_a_page_is_saved(recording, tmp_path, capsys):
 
 @pytest.mark.long
 def test_tasks_hand_a_demonstration_over(recording):
-    words = ("view", TWO_ROBOTS, "--demo", str(recording), "--episode", "1", "--port", "0")
-    with served("tasks", *words) as view:
+    words = ("tasks", "view", TWO_ROBOTS, "--demo", str(recording), "--episode", "1")
+    with served("robot_layouts", *words, "--port", "0") as view:
         assert view.lines[-1].startswith("TwoRobotPickCube-v1, episode 1 of trajectory.h5: http://")
         assert view.interrupt() == (0, "ended\n")
-    other = [sys.executable, "-m", "tasks", "view", "PickCube-v1", "--demo", str(recording)]
+    words = ("-m", "robot_layouts", "tasks", "view", "PickCube-v1", "--demo", str(recording))
+    other = [sys.executable, *words]
     done = subprocess.run(other, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "not in PickCube-v1" in done.stderr

@@ -98,7 +98,7 @@ def _export(path: Path, format_name: str) -> None:
 
 def _view(path: Path) -> None:
     from robot_layouts.data.playing.replay import open_recording
-    from robot_layouts.data.view import episode_cell
+    from robot_layouts.data.viewing import episode_cell
 
     with open_recording(path, None) as file:
         episode_cell(file, 1)

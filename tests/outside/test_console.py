@@ -143,7 +143,7 @@ class TestNew:
         urdf = str(RobotRegistry.load("xarm7").urdf.locate())
         assert main(["new", "robot", urdf, "--name", "my_arm", "--out", str(tmp_path)]) == 0
         done = self.pytest(tmp_path)
-        assert "3 passed" in done.stdout, done.stdout + done.stderr
+        assert "5 passed" in done.stdout, done.stdout + done.stderr
 
     @pytest.mark.parametrize(
         ("name", "robot", "words"),

@@ -22,7 +22,6 @@ from sapien.render import RenderMaterial, RenderShapeTriangleMesh
 from robot_layouts.core.files import read_json, read_regular
 from robot_layouts.core.paths import default_root
 from robot_layouts.kinematics.rotations import Floats
-from robot_layouts.simulation.sapien3.visuals import TEXTURES
 from robots import MissingPackageError
 from robots.assets.assembled import write_folder
 from robots.assets.progress import say
@@ -39,6 +38,7 @@ _CREASE = np.cos(np.radians(35))  # between faces that are shaded as one smooth 
 _NEAREST = 30  # triangles that are looked at for each point; long ones lie side by side
 _POINTS = (100, 20_000, 2e-6)  # of a surface: fewest, most, and the area of each (m²)
 _PLACES = (1000, 60_000, 1e-6)  # by which the nearest triangles are found, likewise
+TEXTURES = ("base_color", "normal", "emission", "transmission", "metallic", "roughness")
 FINISH = ("base_color", "metallic", "roughness", "specular", "ior", "emission", "transmission")
 _LARGEST_TABLE = 2**20  # bytes
 

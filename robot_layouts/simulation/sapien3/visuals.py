@@ -31,11 +31,11 @@ from objects.shapes import (
     Sphere,
 )
 from objects.solids import Triangles, hull_triangles
+from robot_layouts.simulation.sapien3.light_meshes import TEXTURES
 from robots.descriptor import Vector3
 
 _PLANE_HALF_SIZE = 50.0  # of what is drawn of an infinite plane (m)
 _MIPMAPS = 4  # of a floor's texture, as in mani_skill 3.0.1, utils/building/ground.py
-TEXTURES = ("base_color", "normal", "emission", "transmission", "metallic", "roughness")
 
 
 def visual_component(shapes: tuple[Shape, ...]) -> RenderBodyComponent | None:
