@@ -1,4 +1,4 @@
-"""A posture in which a body's hands are above what they work on, with their grippers down."""
+"""How a body stands ready: behind a table, hands above what they work on, grippers down."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ import numpy as np
 
 from layouts.frames import Rectangle
 from layouts.placement import LARGEST_NOISE, Placement
-from layouts.shared_place import are_clear, drawn_postures, places_and_approaches
+from layouts.shared_place import (
+    are_clear,
+    body_corners,
+    drawn_postures,
+    inside_table,
+    places_and_approaches,
+)
 from layouts.validation.collisions import noisy_postures
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, transform
 from robot_layouts.kinematics.solve import IkGoal, shortfalls, solve
@@ -17,6 +23,7 @@ from robot_layouts.kinematics.tree import Tree
 from robots.gripper_motion import gripper_frame, link_tree
 from robots.urdf.tcp import find_tcp
 
+CLEARANCE, STEP = 0.02, 0.01  # m: from a body to the table; in which it is moved back
 HEIGHT = 0.22  # of a reach: how high above the ground hands wait
 ASIDE = 0.15  # of a reach: how far aside from the middle of what is worked on, at least
 DOWN = 0.5  # of a reach, that a gripper is worth which points down instead of level
@@ -57,6 +64,35 @@ def made_ready(
                 placement = ready
                 break
     return placement
+
+
+def off_the_table(
+    placement: Placement, ahead: tuple[float, float], table: Rectangle | None
+) -> Placement:
+    """Return the placement of a body so far back that all of it but its limbs is clear of a table.
+
+    Args:
+        placement: The body.
+        ahead: Which way it faces, x and y (world), of length 1.
+        table: Outline of a table whose top is at z = 0, x_min, y_min, x_max, y_max (m).
+
+    Raises:
+        AssetError: If robot files cannot be found.
+        MissingPackageError: If python-fcl is not installed.
+    """
+    if table is None:
+        return placement
+    x_min, y_min, x_max, y_max = table
+    wide = (x_min - CLEARANCE, y_min - CLEARANCE, x_max + CLEARANCE, y_max + CLEARANCE)
+    corners = body_corners(placement)
+    steps = 0
+    while inside_table(corners - np.array((*ahead, 0.0)) * STEP * steps, wide).any():
+        steps += 1
+    x, y, z = placement.base_position
+    back = STEP * steps
+    return replace(
+        placement, position=(round(x - back * ahead[0], 4), round(y - back * ahead[1], 4), z)
+    )
 
 
 def _postures(placement: Placement, limb: str, place: tuple[float, float]) -> Floats:

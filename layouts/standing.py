@@ -7,13 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
-from layouts.ready import made_ready
-from layouts.shared_place import body_corners, inside_table, shared_place
 from robot_layouts.core.quoting import shown
 from robot_layouts.kinematics.quaternions import forward, yaw_quaternion
 from robots import (
@@ -28,7 +24,6 @@ from robots import (
 # 0.72 of its reach, behind the middle of its table; two arms of one body reach over all of it.
 ALONE, BODY = 0.72, 0.6
 SHOULDER = 0.4  # of a limb's reach; how high its first joint is above where arms of the task stand
-CLEARANCE, STEP = 0.02, 0.01  # m: from a body to the table; in which it is moved back
 Point = tuple[float, float]
 
 NAME = "robot"  # of the place of one robot that serves all roles
@@ -96,6 +91,9 @@ def _moved(placement: Placement, robot: RobotDescriptor, middle: Point) -> Place
 
 def _body(robot: RobotDescriptor, layout: Layout, table: Rectangle | None) -> Placement:
     """Return where a robot stands whose limbs serve all places, and how it starts."""
+    from layouts.ready import made_ready, off_the_table
+    from layouts.shared_place import shared_place
+
     roles = _roles(robot, list(layout))
     limb, role = robot.limbs[next(iter(roles.values()))], next(iter(roles))
     middle, own = _middle(layout), layout[role]
@@ -114,29 +112,12 @@ def _body(robot: RobotDescriptor, layout: Layout, table: Rectangle | None) -> Pl
     serving = robot if list(roles) == list(roles.values()) else replace(robot, limbs=limbs | others)
     placement = Placement(serving, place, faced(robot, yaw_quaternion(yaw)))
     try:
-        placement = _off_the_table(placement, (math.cos(yaw), math.sin(yaw)), table)
+        placement = off_the_table(placement, (math.cos(yaw), math.sin(yaw)), table)
         arms = [f"{NAME}.{role}" for role in roles]
         shared = shared_place(Layout({NAME: placement}), arms, table)
         return made_ready(placement, list(roles), shared[0], table) if shared else placement
     except (AssetError, MissingPackageError):  # its bodies are not known here
         return placement
-
-
-def _off_the_table(placement: Placement, ahead: Point, table: Rectangle | None) -> Placement:
-    """Return the placement of a body so far back that only its limbs are above a table."""
-    if table is None:
-        return placement
-    x_min, y_min, x_max, y_max = table
-    wide = (x_min - CLEARANCE, y_min - CLEARANCE, x_max + CLEARANCE, y_max + CLEARANCE)
-    corners = body_corners(placement)
-    steps = 0
-    while inside_table(corners - np.array((*ahead, 0.0)) * STEP * steps, wide).any():
-        steps += 1
-    x, y, z = placement.base_position
-    back = STEP * steps
-    return replace(
-        placement, position=(round(x - back * ahead[0], 4), round(y - back * ahead[1], 4), z)
-    )
 
 
 def _roles(robot: RobotDescriptor, places: Sequence[str]) -> dict[str, str]:
