@@ -33,7 +33,7 @@ def describe(layout: Arrangement) -> str:
             action_text(split[name]),
             ", ".join(decimal(x) for x in placement.base_position),
             facing_text(placement),
-            placement.start_keyframe,
+            placement.start_keyframe or "–",
             f"{placement.robot.reach:g}",
             *([layout[layout.owner(name)].on or "–"] if hanging else []),
             *([_mode_text(name, layout.owner(name), modes)] if modes else []),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from typing import TYPE_CHECKING
 
 from layouts.frames import ORIGIN, Pose, check_pose, declared_quaternion
-from robot_layouts.core.bounds import as_float, shown
+from robot_layouts.core.bounds import FAR, as_float, checked_numbers, shown
 from robot_layouts.kinematics.quaternions import inverted, multiplied, normalised
 from robots import CONTROL_MODES, LayoutError, RobotDescriptor
 from robots.control_modes import read_mode, written_mode
@@ -42,6 +42,8 @@ class Placement:
             or those of its limbs, as ``"left=pd_ee_pose,right=pd_joint_pos"`` or a mapping, which
             is kept as such a text. None is the task's. The robot stays as it was declared; see
             `Layout.in_control_mode`.
+        qpos: Joint positions that it starts from, in the order of the robot's joints (rad, m),
+            instead of a keyframe's.
     """
 
     robot: RobotDescriptor
@@ -52,6 +54,7 @@ class Placement:
     rpy: Vector3 | None = field(default=None, kw_only=True)
     on: str | None = field(default=None, kw_only=True)
     control_mode: str | None = field(default=None, kw_only=True)
+    qpos: tuple[float, ...] | None = field(default=None, kw_only=True)
     _world: Pose | None = field(default=None, init=False, repr=False, compare=False)
 
     if TYPE_CHECKING:  # a robot may be named; what is kept is its descriptor
@@ -67,6 +70,7 @@ class Placement:
             rpy: Vector3 | None = None,
             on: str | None = None,
             control_mode: str | Mapping[str, str] | None = None,
+            qpos: Sequence[float] | None = None,
         ) -> None:
             """Take a place."""
 
@@ -78,6 +82,8 @@ class Placement:
             if not isinstance(self.keyframe, str):
                 raise LayoutError(f"keyframe is {shown(self.keyframe)}; it takes a keyframe's name")
             self.robot.keyframe(self.keyframe)
+        if self.qpos is not None:
+            object.__setattr__(self, "qpos", _checked_qpos(self))
         noise = as_float(self.qpos_noise)
         if noise is None or not 0 <= noise <= LARGEST_NOISE:
             raise LayoutError(
@@ -137,14 +143,17 @@ class Placement:
         return _without(self.robot.home.quaternion, self.base_quaternion)
 
     @property
-    def start_keyframe(self) -> str:
-        """Name of the keyframe the robot starts from."""
+    def start_keyframe(self) -> str | None:
+        """Name of the keyframe the robot starts from; None if it starts from ``qpos``."""
+        if self.qpos is not None:
+            return None
         return self.robot.home.keyframe if self.keyframe is None else self.keyframe
 
     @property
     def start_qpos(self) -> tuple[float, ...]:
-        """Joint positions of ``start_keyframe``, in the order of the robot's joints (rad, m)."""
-        return self.robot.keyframe(self.start_keyframe)
+        """Joint positions it starts from, in the order of the robot's joints (rad, m)."""
+        start = self.start_keyframe
+        return self.robot.keyframe(start) if start else self.qpos or ()
 
     @property
     def parts(self) -> dict[str, Placement]:
@@ -165,21 +174,25 @@ class Placement:
                 rpy=None,
                 on=None,
                 control_mode=None,
+                qpos=self.qpos and [self.qpos[self.robot.joints.index(j)] for j in part.joints],
             )
         return parts
 
     def with_robot(self, robot: RobotLike) -> Placement:
         """Return the placement with another robot, which faces the same way.
 
+        One of other joints starts from its home's keyframe instead of ``qpos``.
+
         Raises:
             UnknownNameError: If there is no such robot, or it lacks the keyframe.
         """
         robot = load_robot(robot)
+        qpos = self.qpos if robot.joints == self.robot.joints else None
         before, after = self.robot.home.quaternion, robot.home.quaternion
         if before == after or (self.quaternion is None and self.rpy is None):
-            return replace(self, robot=robot)
+            return replace(self, robot=robot, qpos=qpos)
         turn = _without(before, self.local_pose.quaternion)
-        return replace(self, robot=robot, rpy=None, quaternion=faced(robot, turn))
+        return replace(self, robot=robot, rpy=None, quaternion=faced(robot, turn), qpos=qpos)
 
 
 def faced(robot: RobotDescriptor, turn: Quaternion) -> Quaternion:
@@ -244,6 +257,21 @@ def placed(placement: Placement, world: Pose) -> Placement:
     hung = replace(placement)
     object.__setattr__(hung, "_world", world)
     return hung
+
+
+def _checked_qpos(placement: Placement) -> tuple[float, ...]:
+    """Return where joints start (rad, m).
+
+    Raises:
+        LayoutError: If it is no number for each joint, or a keyframe is given, too.
+    """
+    robot = placement.robot
+    if placement.keyframe is not None:
+        raise LayoutError(
+            f"qpos and keyframe {placement.keyframe!r} are given; a robot starts from one of them"
+        )
+    what = f"qpos of {robot.name}, which has {robot.dof} joints,"
+    return checked_numbers(what, placement.qpos, robot.dof, FAR, LayoutError, "rad, m")
 
 
 def _checked_mode(robot: RobotDescriptor, mode: object) -> str | None:

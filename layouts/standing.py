@@ -7,16 +7,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
 from robot_layouts.core.quoting import shown
 from robot_layouts.kinematics.quaternions import forward, yaw_quaternion
-from robots import LayoutError, RobotDescriptor, UnknownNameError
+from robots import (
+    AssetError,
+    LayoutError,
+    MissingPackageError,
+    RobotDescriptor,
+    UnknownNameError,
+)
 
 # Shares of a reach at which what is worked on lies ahead. A Panda of ManiSkill stands 0.615 m, or
 # 0.72 of its reach, behind the middle of its table; two arms of one body reach over all of it.
 ALONE, BODY = 0.72, 0.6
-SHOULDER = 0.25  # of a limb's reach; how high its first joint is above where arms of the task stand
+SHOULDER = 0.4  # of a limb's reach; how high its first joint is above where arms of the task stand
 Point = tuple[float, float]
 
 NAME = "robot"  # of the place of one robot that serves all roles
@@ -28,9 +35,11 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
     A robot stands on the line from the task's own to the middle of what is worked on, as far from
     it as its reach asks for, turned towards it and at the same height. One robot of several limbs
     serves several places at once: its limbs are called like them, the left one serving the first
-    unless they are called so already, and its shoulders are above the places.
+    unless they are called so already, and its shoulders are above the places. Where its files are
+    at hand, all of it but its limbs is behind the task's table, and its hands wait over what they
+    share, grippers down (`Placement.qpos`).
 
-    Nothing is checked; `Layout.validate` and `tasks.make` do so.
+    Nothing else is checked; `Layout.validate` and `tasks.make` do so.
 
     Args:
         robots: Robot by place, for some or all of them; or one robot for all.
@@ -52,7 +61,9 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
     if not isinstance(robots, Mapping):
         robot = load_robot(robots)
         if robot.limbs:
-            return Layout({NAME: _body(robot, layout)}, layout.frames)
+            table = getattr(task, "table", None)
+            outline = table.outline(layout) if table is not None else None
+            return Layout({NAME: _body(robot, layout, outline)}, layout.frames)
         robots = dict.fromkeys(layout, robot)
     loaded = load_robots(robots)
     for place in loaded:
@@ -78,8 +89,11 @@ def _moved(placement: Placement, robot: RobotDescriptor, middle: Point) -> Place
     return replace(placement, robot=robot, position=(x, y, z), quaternion=turned)
 
 
-def _body(robot: RobotDescriptor, layout: Layout) -> Placement:
-    """Return where a robot stands whose limbs serve all places."""
+def _body(robot: RobotDescriptor, layout: Layout, table: Rectangle | None) -> Placement:
+    """Return where a robot stands whose limbs serve all places, and how it starts."""
+    from layouts.ready import made_ready, off_the_table
+    from layouts.shared_place import shared_place
+
     roles = _roles(robot, list(layout))
     limb, role = robot.limbs[next(iter(roles.values()))], next(iter(roles))
     middle, own = _middle(layout), layout[role]
@@ -96,7 +110,14 @@ def _body(robot: RobotDescriptor, layout: Layout) -> Placement:
     limbs = {role: replace(robot.limbs[name], groups=owners[name]) for role, name in roles.items()}
     others = {name: part for name, part in robot.limbs.items() if name not in roles.values()}
     serving = robot if list(roles) == list(roles.values()) else replace(robot, limbs=limbs | others)
-    return Placement(serving, place, faced(robot, yaw_quaternion(yaw)))
+    placement = Placement(serving, place, faced(robot, yaw_quaternion(yaw)))
+    try:
+        placement = off_the_table(placement, (math.cos(yaw), math.sin(yaw)), table)
+        arms = [f"{NAME}.{role}" for role in roles]
+        shared = shared_place(Layout({NAME: placement}), arms, table)
+        return made_ready(placement, list(roles), shared[0], table) if shared else placement
+    except (AssetError, MissingPackageError):  # its bodies are not known here
+        return placement
 
 
 def _roles(robot: RobotDescriptor, places: Sequence[str]) -> dict[str, str]:

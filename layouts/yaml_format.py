@@ -41,7 +41,7 @@ UNITS = "# positions in m; quaternion: w, x, y, z; rpy and qpos_noise in rad"
 
 # Keys in the order in which they are written. Left-out keys keep the value of the declaration.
 FRAME_KEYS = ("on", "position", "quaternion", "rpy")
-ROBOT_KEYS = ("robot", *FRAME_KEYS, "keyframe", "qpos_noise", "control_mode")
+ROBOT_KEYS = ("robot", *FRAME_KEYS, "keyframe", "qpos_noise", "control_mode", "qpos")
 
 NUMBER = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 NOT_FINITE = re.compile(r"[-+]?\.?(?:inf|infinity|nan)", re.IGNORECASE)

@@ -55,7 +55,7 @@ def report(thing: ObjectDescriptor) -> str:
         ),
         "grasps": _grasps(thing),
         "parts": _parts(thing),
-        "joints": _table(
+        "joints": columns(
             [
                 (joint.name, f"{joint.kind}s", f"{joint.lower:g} to {joint.upper:g} {joint.unit}")
                 for joint in thing.joints

@@ -264,7 +264,7 @@ def make_scenario(
             raise TaskError(f"layout is {shown(layout)}; a layouts.Layout is needed")
         scenario.layout = layout
     if robots is not None:
-        scenario.layout = _replace_robots(scenario.layout, robots)
+        scenario.layout = _replace_robots(cls, scenario.layout, robots)
     scenario.num_envs = num_envs
     for name, value in making.items():
         setattr(scenario, name, value)
@@ -327,15 +327,17 @@ class UnexpectedArgumentError(UnknownNameError, TypeError):
         return type(self), (self.args[0], self.name, self.choices)
 
 
-def _replace_robots(layout: Layout, robots: RobotLike | Mapping[str, RobotLike]) -> Layout:
+def _replace_robots(
+    cls: type[MultiRobotTask], layout: Layout, robots: RobotLike | Mapping[str, RobotLike]
+) -> Layout:
     if isinstance(robots, Mapping):
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         return Layout({**layout, **changed}, layout.frames)
     if isinstance(robots, (str, PathLike, RobotDescriptor)):
         if len(layout) == 1:
-            return _replace_robots(layout, {next(iter(layout)): robots})
+            return _replace_robots(cls, layout, {next(iter(layout)): robots})
         if (robot := load_robot(robots)).limbs:
-            return at_task(robot, layout)
+            return at_task(robot, cls if layout == cls.layout else layout)
     given = [robots] if isinstance(robots, (str, RobotDescriptor)) else robots
     names = [name for name in given if isinstance(name, str)] if isinstance(given, list) else []
     example = dict(zip(layout, names or ["panda"], strict=False))

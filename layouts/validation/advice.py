@@ -43,6 +43,8 @@ def to_stand_apart(layout: Arrangement, one: Postures, other: Postures) -> tuple
 def to_start_elsewhere(placement: Placement) -> str:
     """Say which keyframes there are to start from besides the placement's own."""
     robot, start = placement.robot, placement.start_keyframe
+    if start is None:
+        return "start from other joint positions than qpos"
     others = [name for name in robot.keyframes if name != start]
     if not others:
         return f"give {robot.name} a keyframe besides {start!r}, its only one"

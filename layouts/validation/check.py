@@ -156,8 +156,9 @@ class _LayoutCheck:
             ):
                 excess, unit = max(low - value, value - high), units[joint]
                 if excess > LIMIT_TOLERANCE:
+                    start = placement.start_keyframe
                     what = (
-                        f"keyframe {placement.start_keyframe!r} of {name} puts {joint} at"
+                        f"{f'keyframe {start!r}' if start else 'qpos'} of {name} puts {joint} at"
                         f" {value:g} {unit}, {excess:.3g} {unit} beyond its limits"
                         f" {low:g} … {high:g}"
                     )

@@ -88,24 +88,23 @@ class Fingertips:
     def touching(self, end: str) -> str:
         """Return the link that touches what a finger holds: of those rigid with ``end`` the last.
 
-        Where pads or tips are links of their own, fixed to one that moves, they have the corners
-        that are farthest from the palm. Of several that go as far it is the innermost one.
+        Where pads or tips are links of their own, fixed to one that moves, they have the shapes
+        that go farthest from the palm. Of several that go as far it is the innermost one.
         """
         rigid = {self.stance.tree.link(link): link for link in self.stance.model.rigid_with(end)}
         outwards = self._outwards(end)
-        far, inner = dict.fromkeys(rigid.values(), 0.0), dict.fromkeys(rigid.values(), np.inf)
+        shapes: list[tuple[str, float, float]] = []  # link, how far it goes, how far inwards (m)
         for hull in self._hulls:
             if hull.link in rigid:
-                link = rigid[hull.link]
                 corners = transform(self._poses[hull.link], hull.corners)
                 reach = np.linalg.norm(corners - self._palm[:3, 3], axis=1).max()
-                far[link] = max(far[link], float(reach))
-                inner[link] = min(inner[link], float((corners @ outwards).min()))
-        farthest = max(far.values(), default=0.0)
-        near = [link for link, reach in far.items() if 0 < farthest * (1 - PAD) <= reach]
-        innermost = min((inner[link] for link in near), default=0.0) + FLUSH
-        near = [link for link in near if inner[link] <= innermost]
-        return end if end in near or not near else near[-1]
+                shapes.append((rigid[hull.link], float(reach), float((corners @ outwards).min())))
+        farthest = max((reach for _, reach, _ in shapes), default=0.0)
+        near = [(link, inner) for link, reach, inner in shapes if reach >= farthest * (1 - PAD)]
+        innermost = min((inner for _, inner in near), default=0.0) + FLUSH
+        inside = {link for link, inner in near if inner <= innermost}
+        touching = [link for link in rigid.values() if link in inside]
+        return end if end in inside or not touching else touching[-1]
 
     def lever(self, end: str, joint: ModelJoint) -> float:
         """Return how far a tip goes outwards as one joint alone moves (m per rad, or 1)."""

@@ -46,7 +46,7 @@ def fitted(task_class: type[Task], layout: Layout) -> dict[str, Any]:
         TaskError: If no place is in reach of all arms.
     """
     held = max((need.opening or 0.0 for need in task_class.needs.values()), default=0.0)
-    fit = fit_to(layout, task_class.layout, held)
+    fit = fit_to(layout, task_class.layout, held, task_class.table.outline(layout))
     if fit.as_declared:
         return {}
     bodies = {

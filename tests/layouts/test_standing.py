@@ -1,17 +1,19 @@
-"""Other robots at a task's places, without its files."""
+"""Other robots at a task's places."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NoReturn
 
 import numpy as np
 import pytest
 
 from layouts import Layout, Placement, at_task, face_to_face, single
-from robots import LayoutError, RobotRegistry, UnknownNameError
+from robots import AssetError, LayoutError, RobotRegistry, UnknownNameError
+from robots.assets.locator import UrdfLocator
 
 TWO = face_to_face({"left": "panda", "right": "panda"}, spacing=1.5)
-BAXTER = RobotRegistry.load("baxter")
+DUAL = RobotRegistry.load("mobile_panda_dual")
 
 
 def test_the_robots_of_the_task_stay_where_they_are():
@@ -32,30 +34,43 @@ def test_a_shorter_arm_stands_nearer():
 
 
 def test_the_arms_of_one_body_serve_the_roles_called_like_them():
-    """About where people have put it by hand: 0.7 m behind the middle, 0.2 m up."""
-    layout = at_task(BAXTER, TWO)
+    layout = at_task("mobile_panda_dual", TWO)
     (placement,) = layout.values()
-    np.testing.assert_allclose(placement.base_position, (0.7, 0.0, 0.2), atol=0.05)
-    assert placement.robot == BAXTER
+    assert placement.robot == DUAL
+    np.testing.assert_allclose(placement.base_position, (0.56, 0.0, -0.04), atol=0.01)
     assert layout.arm("left").base_position[1] < 0 < layout.arm("right").base_position[1]
 
 
 def test_limbs_of_other_names_are_called_like_the_roles():
-    one = {"a": BAXTER.limbs["left"], "b": BAXTER.limbs["right"]}
+    one = {"a": DUAL.limbs["left"], "b": DUAL.limbs["right"]}
     groups = {"a": "left", "b": "right"}
     limbs = {
         name: replace(limb, groups=(f"{groups[name]}_arm", f"{groups[name]}_gripper"))
         for name, limb in one.items()
     }
-    robot = at_task(replace(BAXTER, limbs=limbs), TWO)["robot"].robot
-    assert robot.limbs["left"].tcp_link == "left_gripper"
-    assert robot.parts["right"].action_split == BAXTER.parts["right"].action_split
+    robot = at_task(replace(DUAL, limbs=limbs), TWO)["robot"].robot
+    assert robot.limbs["left"].tcp_link == "left_panda_hand_tcp"
+    assert robot.parts["right"].action_split == DUAL.parts["right"].action_split
+
+
+def test_a_body_whose_files_are_missing_is_put_by_reach_alone(monkeypatch: pytest.MonkeyPatch):
+    def missing(*_: object, **__: object) -> NoReturn:
+        raise AssetError("no files")
+
+    monkeypatch.setattr(UrdfLocator, "locate", missing)
+    alone = at_task(DUAL, TWO)["robot"]
+    monkeypatch.undo()
+    ready = at_task(DUAL, TWO)["robot"]
+    assert alone == replace(ready, qpos=None)
+    assert ready.start_qpos != alone.start_qpos
 
 
 def test_what_does_not_fit_is_refused():
     three = Layout({**TWO, "third": Placement("panda", (1.0, 0.0, 0.0))})
-    with pytest.raises(LayoutError, match=r"baxter has 2 limbs \(left, right\), and the task 3"):
-        at_task(BAXTER, three)
+    with pytest.raises(
+        LayoutError, match=r"mobile_panda_dual has 2 limbs \(left, right\), and the task 3"
+    ):
+        at_task(DUAL, three)
     with pytest.raises(UnknownNameError, match="unknown place 'lef'. Did you mean 'left'"):
         at_task({"lef": "panda"}, TWO)
     with pytest.raises(LayoutError, match="task is 'PickCube-v1'; a task, its class or a Layout"):

@@ -241,6 +241,21 @@ class TestHands:
         assert robot.fingers.links == ("left_rubber", "right_rubber")
         assert set(robot.fingers.links) < set(robot.gripper_material.links)
 
+    def test_what_a_finger_has_at_its_root_is_not_what_touches(self, tmp_path):
+        parts, last = single_arm(end="")
+        for side, sign in (("left", 1), ("right", -1)):
+            finger = parts.link(f"{side}_finger", 0.02, "0.1 0.01 0.01", "0.05 0 0")
+            root = f'<origin xyz="0 {-0.014 * sign} 0"/><geometry><box size="0.01 0.026 0.01"/>'
+            block = f"<collision>{root}</geometry></collision></link>"  # reaches far inwards
+            parts.links[-1] = parts.links[-1].replace("</link>", block)
+            place, way = f"0.05 {0.03 * sign} 0", f"0 {sign} 0"
+            slides = {"kind": "prismatic", "limits": (0.0, 0.02)}
+            parts.joint(f"{side}_slide", last, finger, place, axis=way, **slides)
+            parts.link(f"{side}_tip", 0.001, "0.03 0.004 0.02")
+            place = f"0.085 {-0.006 * sign} 0"
+            parts.joint(f"{side}_glue", finger, f"{side}_tip", place, kind="fixed")
+        assert guess(parts, tmp_path).descriptor.fingers.links == ("left_tip", "right_tip")
+
     def test_a_gripper_that_turns_and_slides_is_driven_by_one_number(self, tmp_path):
         parts, last = single_arm(end="")
         parts.link("finger_a", 0.05, "0.06 0.01 0.02", "0.03 0 0")

@@ -7,8 +7,9 @@ import pytest
 
 import tasks
 from layouts import Layout, face_to_face, side_by_side
+from layouts.shared_place import shared_place
 from robots import TaskError
-from tasks.language.fitting import AS_DECLARED, Fit, shared_place
+from tasks.language.fitting import AS_DECLARED, Fit
 
 TASK = "TwoRobotHandOver-v1"
 
@@ -76,6 +77,8 @@ def test_arms_that_never_get_near_the_ground_are_refused_in_the_same_words():
 
 
 def test_the_shared_place_lies_in_the_middle_of_equal_arms():
-    (x, y), depth = shared_place(two("panda", spacing=1.5), ("left", "right"))
+    found = shared_place(two("panda", spacing=1.5), ("left", "right"))
+    assert found is not None
+    (x, y), depth = found
     assert np.hypot(x, y) < 0.05
     assert 0.05 < depth < 0.3

@@ -12,7 +12,9 @@ import torch
 import tasks
 from layouts import Layout, Placement, at_task
 from robot_layouts.experts import Rehearsal, Waypoint, find_expert
+from robot_layouts.kinematics.rotations import rotation_of
 from robots import TaskError, UnknownNameError
+from tasks.episode import play
 from tasks.registry import TASKS, make_scenario
 from tests.catalogue import optional_problem
 
@@ -152,3 +154,46 @@ def test_a_script_names_limbs_not_their_robot(env):
         rehearsal.play({name: [Waypoint("stay", most=2, steps=5)]})
     with pytest.raises(UnknownNameError, match=r"arm that takes numbers 'cell'. .*left, right"):
         rehearsal.play({"cell": [Waypoint("stay")]})
+
+
+HAND_OVER = "TwoRobotHandOver-v1"
+
+
+def test_a_body_stands_behind_the_table_with_its_hands_over_it():
+    env = tasks.make(HAND_OVER, robots="mobile_panda_dual", obs_mode="none")  # collides nowhere
+    placement, table = env.layout["robot"], env.task.table.outline(env.layout)
+    assert placement.base_position[0] > table[2] + 0.15  # half its column
+    state, frame = env.simulation.read(), env.task.fit
+    for place, side in (("left", -1), ("right", 1)):
+        x, y, z = state.tcp_position(place)[0]
+        assert x == pytest.approx(frame.x, abs=0.05)
+        assert (y - frame.y) * side > 0.1
+        assert 0.1 < z < 0.3
+        assert rotation_of(state.tcp_pose(place)[0, 3:])[2, 2] < -0.9  # the gripper points down
+    assert table[0] < frame.x < table[2]
+
+
+def test_a_body_where_the_task_says_no_table_is_put_by_reach_alone():
+    own = tasks.get_task_class(HAND_OVER)
+    behind, nowhere = at_task("mobile_panda_dual", own), at_task("mobile_panda_dual", own.layout)
+    assert nowhere["robot"].base_position[0] < behind["robot"].base_position[0]
+    assert nowhere["robot"].base_position[2] == behind["robot"].base_position[2]
+
+
+def test_a_body_drifts_nowhere_while_its_arm_moves():
+    env = tasks.make(HAND_OVER, robots="mobile_panda_dual", obs_mode="none")
+    env.reset(seed=0)
+    before = env.simulation.read().qpos("robot")[0, 18:].copy()
+    for _ in range(10):
+        env.step(env.single_action_space.high[None])
+    assert np.abs(env.simulation.read().qpos("robot")[0, 19:] - before[1:]).max() < 1e-3
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "body", ["mobile_panda_dual", pytest.param("baxter", marks=pytest.mark.example_robots)]
+)
+def test_a_body_hands_over_from_arm_to_arm(body):
+    env = tasks.make(HAND_OVER, robots=body, obs_mode="none")
+    expert = find_expert(HAND_OVER)
+    assert all(play(env, seed, expert(env, seed)).solved for seed in range(2))

@@ -108,10 +108,11 @@ SIMULATION = _Simulation | None
 def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
     """Return everything about a layout's robots that physics depends on, by robot name.
 
-    Each has ``robot``, base ``position`` (m) and ``quaternion`` (wxyz), ``keyframe``,
-    ``start_qpos`` (rad, m), ``qpos_noise`` (rad), ``action`` (its first and last + 1 action
-    number), ``joint_groups`` (see `robots.JointGroup`), and ``assets``, a SHA-256 over its files.
-    Everything can be written as json; the order is that of the action numbers.
+    Each has ``robot``, base ``position`` (m) and ``quaternion`` (wxyz), ``keyframe`` (None if it
+    starts from positions of its own), ``start_qpos`` (rad, m), ``qpos_noise`` (rad), ``action``
+    (its first and last + 1 action number), ``joint_groups`` (see `robots.JointGroup`), and
+    ``assets``, a SHA-256 over its files. Everything can be written as json; the order is that of
+    the action numbers.
 
     Raises:
         AssetError: If robot files cannot be found.

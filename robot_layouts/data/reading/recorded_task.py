@@ -178,6 +178,7 @@ def layout_again(
                 about["keyframe"],
                 about["qpos_noise"],
                 control_mode=about.get("control_mode"),
+                qpos=None if about["keyframe"] else about.get("start_qpos"),
             )
         except TrajectoryError:
             raise
@@ -202,5 +203,5 @@ def same_places(first: Layout, second: Layout) -> bool:
 
 def _outline(place: str, placement: Placement) -> tuple[Any, ...]:
     pose = placement.base_pose
-    start = placement.start_keyframe, placement.qpos_noise
+    start = placement.start_keyframe, placement.qpos, placement.qpos_noise
     return place, placement.robot, pose.position, pose.quaternion, *start

@@ -30,8 +30,9 @@ from tasks import TaskEnv
 GIVER, TAKER, CUBE, GOAL = "left", "right", "cube", "goal_site"
 
 # Shares of the cube's edge: how far before the cube's middle each gripper's own middle is. Hands
-# that hold more than their own half hold it by different faces.
-DEPTHS = (0.2, -0.1, -0.35)
+# that hold more than their own half hold it by different faces. Those of one body come from the
+# same side, across each other's fingers, and hold it by its edge first.
+DEPTHS, EDGE = (0.2, -0.1, -0.35), 0.4
 OWN_HALF = 0.1  # the least depth at which each holds its own half
 NEAR = 0.3  # how far from its place a gripper may be when it closes or waits
 BEFORE = 3  # times as far it may be from where it begins to come to the cube
@@ -105,7 +106,7 @@ class _Picking:
         qpos: All joints of its robot then, (dof,) (rad, m).
         turn: How the grip's frame is turned, (3, 3), world.
         grip: How the cube lies in its hand.
-        depth: Of that, one of `DEPTHS`.
+        depth: Of that, one of `DEPTHS` or `EDGE`.
     """
 
     qpos: Floats
@@ -154,6 +155,8 @@ class _Search:
             lambda world, _: task.table.add_to(world, "table"),
         )
         self._usual = self._parts({})
+        one_body = self._giver.owner == self._taker.owner
+        self._depths = (EDGE, *DEPTHS) if one_body else (*DEPTHS, EDGE)
 
     def picks(self) -> Iterator[_Picking]:
         """Yield ways to hold the cube as it lies, the most promising first.
@@ -162,7 +165,7 @@ class _Search:
             TaskError: If there are none.
         """
         found = False
-        for grip, depth in self._grips(self._giver, *DEPTHS):
+        for grip, depth in self._grips(self._giver, *self._depths):
             postures = self._picks(grip)
             for row in self._free_picks(postures):
                 found = True
@@ -276,7 +279,7 @@ class _Search:
     ) -> Iterator[_Exchange]:
         """Yield the meetings in which the taker can hold the cube, where the giver gives it."""
         taker = self._taker
-        grip, taken = next(self._grips(taker, depth, *DEPTHS))
+        grip, taken = next(self._grips(taker, depth, *self._depths))
         start = taker.opened(taker.qpos(self._scene), grip.share)
         rows = [
             (row, turn)

@@ -1,0 +1,138 @@
+"""How a body stands ready: behind a table, hands above what they work on, grippers down."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from layouts.frames import Rectangle
+from layouts.placement import LARGEST_NOISE, Placement
+from layouts.shared_place import (
+    are_clear,
+    body_corners,
+    drawn_postures,
+    inside_table,
+    places_and_approaches,
+)
+from layouts.validation.collisions import noisy_postures
+from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, transform
+from robot_layouts.kinematics.solve import IkGoal, shortfalls, solve
+from robot_layouts.kinematics.tree import Tree
+from robots.gripper_motion import gripper_frame, link_tree
+from robots.urdf.tcp import find_tcp
+
+CLEARANCE, STEP = 0.02, 0.01  # m: from a body to the table; in which it is moved back
+HEIGHT = 0.22  # of a reach: how high above the ground hands wait
+ASIDE = 0.15  # of a reach: how far aside from the middle of what is worked on, at least
+DOWN = 0.5  # of a reach, that a gripper is worth which points down instead of level
+STARTS = 100  # random postures that hands are brought to their places from
+ITERATIONS = 30
+MISSING, TURNED = 0.02, 0.35  # m and rad that a posture may miss
+NOISES, NOISIER = 20, 2.0  # draws of joint noise in which nothing may touch; times its deviation
+
+
+def made_ready(
+    placement: Placement,
+    limbs: Sequence[str],
+    place: tuple[float, float],
+    table: Rectangle | None = None,
+) -> Placement:
+    """Return the placement of a body that starts with its hands over a place, grippers down.
+
+    Each hand is before its own shoulder. Nothing is inside itself, another hand or the table, with
+    joint noise, either. A limb that has no such posture stays as it is, and so does all else.
+
+    Args:
+        placement: The body.
+        limbs: Its limbs that are to be ready.
+        place: The middle of what is worked on, x and y (m, world).
+        table: Outline of a table whose top is at z = 0, x_min, y_min, x_max, y_max (m).
+
+    Raises:
+        AssetError: If robot files cannot be found.
+        MissingPackageError: If python-fcl is not installed.
+    """
+    random = np.random.default_rng(0)
+    for limb in limbs:
+        for qpos in _postures(placement, limb, place):
+            ready = replace(placement, keyframe=None, qpos=[round(at, 4) for at in qpos.tolist()])
+            noisier = replace(ready, qpos_noise=min(NOISIER * ready.qpos_noise, LARGEST_NOISE))
+            draws = noisy_postures(noisier, NOISES, random)
+            if are_clear(placement, limb, draws, table, alone=False).all():
+                placement = ready
+                break
+    return placement
+
+
+def off_the_table(
+    placement: Placement, ahead: tuple[float, float], table: Rectangle | None
+) -> Placement:
+    """Return the placement of a body so far back that all of it but its limbs is clear of a table.
+
+    Args:
+        placement: The body.
+        ahead: Which way it faces, x and y (world), of length 1.
+        table: Outline of a table whose top is at z = 0, x_min, y_min, x_max, y_max (m).
+
+    Raises:
+        AssetError: If robot files cannot be found.
+        MissingPackageError: If python-fcl is not installed.
+    """
+    if table is None:
+        return placement
+    x_min, y_min, x_max, y_max = table
+    wide = (x_min - CLEARANCE, y_min - CLEARANCE, x_max + CLEARANCE, y_max + CLEARANCE)
+    corners = body_corners(placement)
+    steps = 0
+    while inside_table(corners - np.array((*ahead, 0.0)) * STEP * steps, wide).any():
+        steps += 1
+    x, y, z = placement.base_position
+    back = STEP * steps
+    return replace(
+        placement, position=(round(x - back * ahead[0], 4), round(y - back * ahead[1], 4), z)
+    )
+
+
+def _postures(placement: Placement, limb: str, place: tuple[float, float]) -> Floats:
+    """Return postures in which a limb is ready, the most comfortable first, (n, dof) (rad, m)."""
+    robot, arm, tree = placement.robot, placement.robot.parts[limb], link_tree(placement.robot)
+    columns = [robot.joints.index(joint) for joint in arm.arm_joints]
+    base = pose_matrix(placement.base_position, placement.base_quaternion)
+    shoulder = robot.limbs[limb].base[1]
+    aside = np.sign(shoulder) * max(abs(shoulder), ASIDE * arm.reach)
+    target = (*place, HEIGHT * arm.reach) + aside * base[:3, 1]
+    places, approaches = places_and_approaches(robot, arm)
+    away = np.linalg.norm(transform(base, places) - target, axis=1)
+    away += DOWN * arm.reach * (approaches @ base[2, :3])
+    nearest = np.argsort(away)[:STARTS]
+    qpos = np.tile(placement.start_qpos, (STARTS, 1))
+    qpos[:, columns] = drawn_postures(robot, arm)[nearest][:, columns]
+    tcp, frame = find_tcp(arm, tree), gripper_frame(arm)
+    turns = base[:3, :3] @ tree.forward(qpos)[:, tcp.turned, :3, :3] @ frame
+    goal = IkGoal(
+        transform(inverse_pose(base), np.tile(target, (STARTS, 1))),
+        tcp.links,
+        base[:3, :3].T @ _downwards(turns) @ frame.T,
+        tcp.turned,
+        tcp.offset if tcp.offset.any() else None,
+    )
+    qpos = solve(tree, goal, qpos, columns, ITERATIONS).qpos
+    missing, turned = shortfalls(tree, goal, qpos)
+    qpos = qpos[(missing < MISSING) & (turned < TURNED)]
+    return qpos[np.argsort(_strain(tree, qpos, columns))]
+
+
+def _downwards(turns: Floats) -> Floats:
+    """Return the orientations of grippers that point down and head where others do, (n, 3, 3)."""
+    across = turns[:, :, 0] * (1.0, 1.0, 0.0)
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    down = np.broadcast_to((0.0, 0.0, -1.0), across.shape)
+    return np.stack([across, np.cross(down, across), down], axis=2)
+
+
+def _strain(tree: Tree, qpos: Floats, columns: Sequence[int]) -> Floats:
+    """Return how far joints are from the middle of their ranges, from 0 to 1, squared, (n,)."""
+    low, high = np.clip(tree.limits[columns], -np.pi, np.pi).T
+    return (((2 * qpos[:, columns] - low - high) / (high - low)) ** 2).mean(axis=1)

@@ -1,0 +1,195 @@
+"""Where on the ground all arms of a layout can work, with their grippers down."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import lru_cache
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from layouts.arrangement import Arrangement
+from layouts.frames import Rectangle
+from layouts.placement import Placement
+from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
+from robot_layouts.kinematics.solve import scattered
+from robot_layouts.kinematics.tree import Tree
+from robots import MissingPackageError, RobotDescriptor
+from robots.bodies.hulls import load_model
+from robots.bodies.overlaps import overlapping
+from robots.gripper_motion import gripper_frame, home_of, link_tree
+from robots.urdf.tcp import find_tcp
+
+_SAMPLES = 20_000  # random joint positions per arm
+_LEAST_DOWN = 0.3  # cosine between a gripper's approach and straight down
+_CELL = 0.05  # of the shorter reach: edge of the cells that places are counted in
+_HEIGHT = 0.35  # of the shorter reach: how high above the ground places are looked for
+_OFTEN = 3  # samples in a cell and its neighbours that show it to be well within reach
+
+
+def shared_place(
+    layout: Arrangement, places: Sequence[str], table: Rectangle | None = None
+) -> tuple[tuple[float, float], float] | None:
+    """Return the place on the ground that lies deepest within reach of all arms, and how deep (m).
+
+    An arm reaches a place if random postures often bring its TCP there, near the ground and with
+    the gripper pointing down more than it does aside. Of an arm on a body only postures count in
+    which it is neither inside itself, the body, nor the table, as far as python-fcl can tell.
+
+    Args:
+        layout: The robots.
+        places: The arms, by their names or places.
+        table: Outline of the table that bodies work on, x_min, y_min, x_max, y_max (m).
+
+    Returns:
+        None if no place is in reach of all of them.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+    """
+    reach = min(layout.arm(place).robot.reach for place in places)
+    cell = _CELL * reach
+    reached = [_near_ground(layout, place, _HEIGHT * reach, table) for place in places]
+    everywhere = np.concatenate(reached) if all(map(len, reached)) else np.zeros((1, 2))
+    low, high = everywhere.min(axis=0) - 2 * cell, everywhere.max(axis=0) + 2 * cell
+    counts = np.ceil((high - low) / cell).astype(int)
+    shared = np.ones(counts, bool)
+    for points in reached:
+        shared &= _often(points, low, cell, counts)
+    if not shared.any():
+        return None
+    depths = _depths(shared) * cell
+    # Of equally deep places the one in the middle of all.
+    deepest = np.argwhere(depths >= depths.max() - cell / 2)
+    middle = deepest[np.argmin(np.abs(deepest - deepest.mean(axis=0)).sum(axis=1))]
+    x, y = (low + (middle + 0.5) * cell).tolist()
+    return (x, y), float(depths.max())
+
+
+def _near_ground(layout: Arrangement, place: str, height: float, table: Rectangle | None) -> Floats:
+    """Return where postures bring a TCP that is low and points down, (n, 2) (m, world)."""
+    owner, arm = layout[layout.owner(place)], layout.arm(place).robot
+    base = pose_matrix(owner.base_pose.position, owner.base_pose.quaternion)
+    points, approaches = places_and_approaches(owner.robot, arm)
+    points, approaches = transform(base, points), approaches @ base[:3, :3].T
+    low = (points[:, 2] > 0) & (points[:, 2] < height) & (approaches[:, 2] < -_LEAST_DOWN)
+    if limb := layout.arm_name(place).partition(".")[2]:
+        low &= _is_on(points, table)
+        with suppress(MissingPackageError):  # all of them count then
+            low[low] = are_clear(owner, limb, drawn_postures(owner.robot, arm)[low], table)
+    return points[low, :2]
+
+
+def are_clear(
+    placement: Placement,
+    limb: str,
+    qpos: Floats,
+    table: Rectangle | None = None,
+    *,
+    alone: bool = True,
+) -> NDArray[np.bool_]:
+    """Return whether a limb is inside neither itself, its body nor a table, (n,).
+
+    Args:
+        placement: The body.
+        limb: One of its limbs.
+        qpos: All joints of the body, (n, dof) (rad, m).
+        table: Outline of a table whose top is at z = 0 (m).
+        alone: Whether the other limbs do not count.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+        MissingPackageError: If python-fcl is not installed.
+    """
+    model, robot = load_model(placement.robot), placement.robot
+    carried = {name: _carried(model.kinematics, robot, robot.parts[name]) for name in robot.limbs}
+    own = carried.pop(limb)
+    others = frozenset().union(*carried.values()) if alone else frozenset()
+    links = [hull.link for hull in model.hulls]
+    pairs = [
+        pair
+        for pair in model.self_pairs
+        if any(links[i] in own for i in pair) and not any(links[i] in others for i in pair)
+    ]
+    base = pose_matrix(placement.base_position, placement.base_quaternion)
+    arm = [hull for hull in model.hulls if hull.link in own]
+    return np.array(
+        [
+            not overlapping(model.hulls, poses, pairs).any()
+            and not any(
+                inside_table(transform(poses[hull.link], hull.corners), table).any() for hull in arm
+            )
+            for poses in base @ model.kinematics.forward(qpos)
+        ],
+        bool,
+    )
+
+
+def _carried(tree: Tree, robot: RobotDescriptor, part: RobotDescriptor) -> frozenset[int]:
+    """Return the links that the joints of a part of a robot move."""
+    columns = [robot.joints.index(joint) for joint in part.joints]
+    moved = np.isin(tree.drivers, columns)
+    return frozenset(i for i in range(len(tree.links)) if moved[list(tree.path(i))].any())
+
+
+def body_corners(placement: Placement) -> Floats:
+    """Return the corners of a robot's hulls that no limb carries, (n, 3) (m, world)."""
+    model, robot = load_model(placement.robot), placement.robot
+    limbs = [_carried(model.kinematics, robot, robot.parts[limb]) for limb in robot.limbs]
+    base = pose_matrix(placement.base_position, placement.base_quaternion)
+    poses = base @ model.kinematics.forward(np.array([placement.start_qpos]))[0]
+    body = [hull for hull in model.hulls if not any(hull.link in links for links in limbs)]
+    corners = [transform(poses[hull.link], hull.corners) for hull in body]
+    return np.concatenate([np.zeros((0, 3)), *corners])
+
+
+def inside_table(points: Floats, table: Rectangle | None) -> NDArray[np.bool_]:
+    """Return which points, (n, 3) (m, world), are inside a table, (n,)."""
+    return _is_on(points, table) & (points[:, 2] < 0) & (table is not None)
+
+
+def _is_on(points: Floats, table: Rectangle | None) -> NDArray[np.bool_]:
+    """Return which points, (n, 3) (m, world), are above or inside a table; all of them if None."""
+    x_min, y_min, x_max, y_max = table or (-np.inf, -np.inf, np.inf, np.inf)
+    x, y, _ = points.T
+    return (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max)
+
+
+def drawn_postures(robot: RobotDescriptor, arm: RobotDescriptor) -> Floats:
+    """Return the random postures of an arm, (n, dof) (rad, m)."""
+    tree = link_tree(robot)
+    columns = [robot.joints.index(joint) for joint in arm.arm_joints]
+    qpos = np.tile(home_of(robot, tree), (_SAMPLES, 1))
+    qpos[:, columns] = scattered(tree.limits[columns], _SAMPLES)
+    return qpos
+
+
+@lru_cache(maxsize=32)
+def places_and_approaches(robot: RobotDescriptor, arm: RobotDescriptor) -> tuple[Floats, Floats]:
+    """Return places and approaches of an arm's gripper in random postures, (n, 3) each, root."""
+    qpos, tree = drawn_postures(robot, arm), link_tree(robot)
+    tree = tree.towards(find_tcp(arm, tree).needed)
+    tcp, poses = find_tcp(arm, tree), tree.forward(qpos)
+    return tcp.places(poses), poses[:, tcp.turned, :3, :3] @ gripper_frame(arm)[:, 2]
+
+
+def _often(points: Floats, low: Floats, cell: float, counts: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return which cells hold enough points, with their neighbours."""
+    found = np.zeros(counts)
+    inside = np.floor((points - low) / cell).astype(int)
+    np.add.at(found, tuple(inside.T), 1)
+    padded = np.pad(found, 1)
+    rows, columns = counts
+    near = sum(padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3))
+    return np.asarray(near >= _OFTEN)
+
+
+def _depths(inside: NDArray[np.bool_]) -> Floats:
+    """Return how far each cell is from the nearest that is not inside, in cells."""
+    others, cells = np.argwhere(~inside), np.argwhere(inside)
+    depths = np.zeros(inside.shape)
+    for cell in cells:
+        depths[tuple(cell)] = sqrt(((others - cell) ** 2).sum(axis=1).min())
+    return depths
