@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -262,7 +263,7 @@ def test_shaders_that_do_not_tell_what_is_asked_for():
         ("nothing", "it is 'nothing'; it must be an object"),
     ],
 )
-def test_a_file_that_declares_no_cameras(tmp_path, text: str, message: str):
+def test_a_file_that_declares_no_cameras(tmp_path: Path, text: str, message: str):
     path = tmp_path / "cameras.yaml"
     path.write_text(text)
     with pytest.raises(TaskError) as caught:
@@ -271,7 +272,7 @@ def test_a_file_that_declares_no_cameras(tmp_path, text: str, message: str):
     assert str(path) in str(caught.value)
 
 
-def test_a_file_declares_what_python_does(tmp_path):
+def test_a_file_declares_what_python_does(tmp_path: Path):
     path = tmp_path / "cameras.yaml"
     path.write_text("""
 cameras:
