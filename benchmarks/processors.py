@@ -153,7 +153,8 @@ def processors(
     Args:
         tasks: Task ids (all).
         seeds: Of each expert and control mode.
-        settings: Under which settings to play, by the names in the page (all without QEMU).
+        settings: Under which settings to play, or to verify receipts, by the names in the page (all
+            without QEMU).
         pictures: Play nothing; draw pictures in several ways.
         receipts: Play nothing; verify receipts of policies that see in several ways.
         out: The record, which keeps other settings that were measured before; the page is beside.
@@ -169,7 +170,11 @@ def processors(
         if pictures:
             record["pictures"] = _drawn()
         if receipts:
-            record["receipts"] = {"processor": _processor(), "driver": _driver(), **verified()}
+            record["receipts"] = {
+                "processor": _processor(),
+                "driver": _driver(),
+                **verified(record["receipts"], settings),
+            }
         write_record(out, record)
     elif not render:
         libraries = {**versions_of(*PACKAGES), "glibc": platform.libc_ver()[1]}

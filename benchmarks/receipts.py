@@ -10,9 +10,10 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -31,6 +32,7 @@ from robots import SimulationError
 from robots.portable import numpy_versions
 
 EPISODES, STEPS, SIZE = 25, 20, 64  # of each cell, of an episode, pixels
+EMULATED = 2  # episodes that are verified on an emulated processor, where each takes minutes
 CAPS, THREADS = "GALLIUM_OVERRIDE_CPU_CAPS", "LP_NUM_THREADS"
 
 
@@ -49,15 +51,15 @@ class Seeing:
         digest = sha256()
         for picture in pictures_of(observation).values():
             digest.update(np.ascontiguousarray(picture).tobytes())
-        numbers = np.frombuffer(digest.digest(), np.uint8)[: self.numbers].astype(np.float32)
-        return numbers / np.float32(127.5) - np.float32(1)
+        numbers = np.frombuffer(digest.digest(), np.uint8)[: self.numbers]
+        return (numbers / 127.5 - 1).astype(np.float32)
 
 
 one_arm, two_arms = Seeing(8), Seeing(16)
 
 
 class Cell(NamedTuple):
-    """A task of two cameras, and who plays.
+    """A task, and who plays.
 
     Attributes:
         policy: Its name in this module.
@@ -102,31 +104,38 @@ def ways() -> dict[str, Way]:
     }
 
 
-def verified(names: Iterable[str] = ()) -> dict[str, Any]:
+def verified(before: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
     """Verify a receipt of each cell in several ways, and return how often all was equal.
 
     Args:
-        names: Which ways (all).
+        before: What was verified before in other ways, which is kept.
+        names: Which ways (all without QEMU).
     """
-    chosen = {name: way for name, way in ways().items() if not names or name in {*names}}
+    known = ways()
+    chosen = names or [name for name, way in known.items() if not way.setting.emulated]
+    first = next(iter(known))  # which writes the receipt
     found: dict[str, dict[str, Any]] = {
-        name: {"about": way.setting.about, "cells": {}} for name, way in chosen.items()
+        name: {"about": way.setting.about, "cells": {}}
+        for name, way in known.items()
+        if name == first or name in chosen
     }
     with TemporaryDirectory() as folder:
-        for task, (name, way) in tqdm(
-            [(t, w) for t in CELLS for w in chosen.items()], disable=None
-        ):
-            request = {"task": task, "file": f"{folder}/{task}.json", "workers": way.workers}
+        for task, name in tqdm(list(product(CELLS, found)), disable=None):
+            way, file = known[name], f"{folder}/{task}.json"
+            count = EMULATED if way.setting.emulated else EPISODES
+            request = {"task": task, "file": file, "workers": way.workers, "count": count}
             try:
                 (answer,) = answers_under(way.setting, "benchmarks.receipts", request, 1)
             except SimulationError:  # the driver ends the process
                 answer = None
             found[name]["cells"][task] = answer
-    return {"episodes": EPISODES, "steps": STEPS, "size": SIZE, "ways": found}
+    every = {**before.get("ways", {}), **found}
+    rows = {name: every[name] for name in known if name in every}
+    return {"episodes": EPISODES, "steps": STEPS, "size": SIZE, "ways": rows}
 
 
-def _verify(task: str, file: str, workers: int, episodes: int = EPISODES) -> dict[str, int]:
-    """Verify a receipt, which is written first where there is none; say what was equal."""
+def _verify(task: str, file: str, workers: int, count: int) -> dict[str, int]:
+    """Verify the first episodes of a receipt, which is written first where there is none."""
     policy, robots = f"benchmarks.receipts:{CELLS[task].policy}", CELLS[task].robots
     if not Path(file).exists():
         making: dict[str, Any] = {
@@ -136,10 +145,12 @@ def _verify(task: str, file: str, workers: int, episodes: int = EPISODES) -> dic
             "visuals": "light",
             "max_episode_steps": STEPS,
         }
-        evaluate(policy, task, range(episodes), workers=workers, receipt=file, **making)
-    found = verify(Receipt.read(file), workers=workers, policy=policy)
-    recorded = found.receipt.episodes
+        evaluate(policy, task, range(count), workers=workers, receipt=file, **making)
+    receipt = Receipt.read(file)
+    recorded = receipt.episodes[:count]
+    found = verify(replace(receipt, episodes=recorded), workers=workers, policy=policy)
     return {
+        "episodes": len(recorded),
         "pictures": sum(len(p) for e in recorded for p in e.picture_digests().values()),
         "equal": len(recorded) - len(found.differences),
         "other_pictures": sum(p.different for e in found.differences for p in e.pictures),
