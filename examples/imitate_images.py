@@ -2,7 +2,7 @@
 
     pip install 'robot-layouts[preview,light]'
     python examples/imitate_images.py TwoRobotLiftBar-v1
-    python examples/imitate_images.py PushCube-v1 --size 64 --visuals light --episodes 200
+    python examples/imitate_images.py PushCube-v1 --size 64 --visuals light --episodes 100
 
 It learns as the network of `imitate.py` does, but is not told where objects are: it gets small
 pictures of all cameras, and what real robots sense of themselves. The pictures are recorded with

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from robot_layouts.__main__ import main
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
+from tasks.engine.columns import ROBOMIMIC, picture_column
 from tests.data.recordings import edited
 
 LOOKS = """
@@ -95,6 +97,11 @@ def test_a_replay_has_the_cameras_of_the_recording(tmp_path: Path):
     assert same(replay(recorded, tmp_path / "again"), before)
     smaller = replay(recorded, tmp_path / "smaller", "--camera-size", "8x8")
     assert smaller["top"].shape[1:3] == (8, 8)
+    words = ["--format", "robomimic", "--cameras", "palm", "--workers", "0"]
+    assert main(["export", str(recorded), *words, "--out", str(tmp_path / "set")]) == 0
+    with h5py.File(tmp_path / "set" / "image.hdf5") as dataset:
+        column = picture_column(ROBOMIMIC, "palm", "rgb")
+        assert np.array_equal(dataset["data/demo_0/obs"][column], before["palm"][:-1])
     header = json.loads((recorded / "trajectory.json").read_text())
     assert header["pictures"]["cameras"][0]["mount"] == ["arm", "panda_hand"]
     with edited(recorded / "trajectory.h5") as file:

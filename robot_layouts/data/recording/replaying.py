@@ -135,6 +135,8 @@ def replay_recording(
     """
     if (obs_mode is None) != (folder is None) or (folder is not None and start == "state"):
         raise TaskError("--obs-mode and --out go together, and not with --from state")
+    if observing and folder is None:
+        raise TaskError("nothing is drawn without --obs-mode and --out, so cameras do not matter")
     places = places_by_seed(file, count)
     if places is None:
         if folder is not None or not isinstance(executor, InProcessExecutor):
