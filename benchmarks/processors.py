@@ -11,11 +11,9 @@ from __future__ import annotations
 import json
 import os
 import platform
-import shutil
-import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from hashlib import sha256
 from pathlib import Path
@@ -26,6 +24,8 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from benchmarks.asking import PLAIN, Setting, answers_under
+from benchmarks.receipts import verified
 from benchmarks.records import (
     DOCS,
     Record,
@@ -63,8 +63,7 @@ CAMERAS = (
     Camera((0.6, 0.7, 0.6), (0.0, 0.0, 0.35), "side", 224, 160, 1.0),
 )
 ABSENT = -1  # an episode of another length
-PLAIN, PORTABLE = "as it is", "portable"
-EMULATOR = "qemu-x86_64-static"
+PORTABLE = "portable"
 LATEST = ("X86_V4", "AVX512_ICL", "AVX512_SPR", "AVX512F", "AVX512_SKX")
 
 SWIFTSHADER = "/usr/lib/chromium/vk_swiftshader_icd.json"
@@ -90,22 +89,6 @@ class Played(NamedTuple):
     def __str__(self) -> str:
         """Return it in words."""
         return f"{self.task}, seed {self.seed}, {self.control}"
-
-
-class Setting(NamedTuple):
-    """How episodes are played.
-
-    Attributes:
-        about: What that stands for, for the table.
-        variables: Of the environment.
-        against: Name of the setting whose bits it should have.
-        emulated: The processor that is emulated, as QEMU calls it; empty if none is.
-    """
-
-    about: str
-    variables: Mapping[str, str]
-    against: str = PLAIN
-    emulated: str = ""
 
 
 def settings() -> dict[str, Setting]:
@@ -161,6 +144,7 @@ def processors(
     seeds: int = 1,
     settings: tuple[str, ...] = (),
     pictures: bool = False,
+    receipts: bool = False,
     out: Path = DOCS / "processors.json",
     render: bool = False,
 ) -> int:
@@ -169,8 +153,10 @@ def processors(
     Args:
         tasks: Task ids (all).
         seeds: Of each expert and control mode.
-        settings: Under which settings to play, by the names in the page (all without QEMU).
+        settings: Under which settings to play, or to verify receipts, by the names in the page (all
+            without QEMU).
         pictures: Play nothing; draw pictures in several ways.
+        receipts: Play nothing; verify receipts of policies that see in several ways.
         out: The record, which keeps other settings that were measured before; the page is beside.
         render: Play nothing; write the page of the record anew.
 
@@ -179,8 +165,16 @@ def processors(
     """
     record = read_record(out, processor="", versions={}, settings={}, portable={})
     record.setdefault("pictures", {})
-    if pictures and not render:
-        record["pictures"] = _drawn()
+    record.setdefault("receipts", {})
+    if (pictures or receipts) and not render:
+        if pictures:
+            record["pictures"] = _drawn()
+        if receipts:
+            record["receipts"] = {
+                "processor": _processor(),
+                "driver": _driver(),
+                **verified(record["receipts"], settings),
+            }
         write_record(out, record)
     elif not render:
         libraries = {**versions_of(*PACKAGES), "glibc": platform.libc_ver()[1]}
@@ -271,29 +265,7 @@ def play_under(setting: Setting, episodes: Sequence[Played]) -> list[Digests | N
     Raises:
         SimulationError: If there is no emulator, or the process ends before it is through.
     """
-    command = [sys.executable, "-m", "benchmarks.processors"]
-    if setting.emulated:
-        if (emulator := shutil.which(EMULATOR)) is None:
-            raise SimulationError(
-                f"there is no program {EMULATOR!r} to emulate a {setting.emulated} with; Debian's"
-                " package qemu-user-static brings it"
-            )
-        command = [emulator, "-cpu", setting.emulated, *command]
-    done = subprocess.run(
-        command,
-        env={**os.environ, "OMP_NUM_THREADS": "1", **setting.variables},
-        input=json.dumps(list(episodes)),
-        stdout=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
-    found: list[Digests | None] = [json.loads(line) for line in done.stdout.splitlines()]
-    if done.returncode or len(found) < len(episodes):
-        raise SimulationError(
-            f"{' '.join(command)} ended with {done.returncode} after {len(found)} of"
-            f" {len(episodes)} episodes; its own messages stand above"
-        )
-    return found
+    return answers_under(setting, "benchmarks.processors", list(episodes), len(episodes))
 
 
 def differences(

@@ -82,6 +82,12 @@ class Recipe:
     blocks: int = 3
     batch: int = 256
     learning_rate: float = 1e-3
+    options: ClassVar[tuple[str, ...]] = ()  # fields that the command line sets as well
+
+    @property
+    def making(self) -> dict[str, Any]:
+        """What is recorded beside states and actions: arguments of `tasks.make`."""
+        return {}
 
 
 def shaking(recipe: Recipe) -> Randomization:
@@ -99,7 +105,7 @@ def _arms(layout: Layout) -> Iterator[DrivenGroup]:
 
 def demonstrate(recipe: Recipe, folder: Path, workers: int | None) -> None:
     """Record the expert's episodes that are not in the folder yet."""
-    how: dict[str, Any] = {"workers": workers, "randomization": shaking(recipe)}
+    how: dict[str, Any] = {"workers": workers, "randomization": shaking(recipe), **recipe.making}
     with Progress(recipe.episodes, "episodes") as line:
         how["on_event"] = lambda so_far, _: line.update(so_far.recorded, "recording")
         record(recipe.task, range(recipe.episodes), folder, **how)
@@ -487,12 +493,16 @@ def main(
     add("--seed", type=int, default=usual.seed, help="of weights and batches (%(default)s)")
     add("--examined", type=int, default=25, help="episodes now and then (%(default)s)")
     add("--tests", type=int, default=100, help="test episodes (%(default)s)")
+    for field in usual.options:
+        value = getattr(usual, field)
+        add(f"--{field}", type=type(value), default=value, help="of pictures (%(default)s)")
     add("--workers", type=int, help="processes that record (default: one per core)")
     add("--recording", type=Path, help="folder of a recording that is there already")
     add("--out", type=Path, help=f"folder (default: runs/{name}/TASK)")
     options = parser.parse_args(arguments)
     sys.path.append(os.getcwd())  # for MODULE:ID of the present folder
-    recipe = policies.recipes(options.task, options.episodes, options.steps, options.seed)
+    fields = ("task", "episodes", "steps", "seed", *usual.options)
+    recipe = policies.recipes(**{name: getattr(options, name) for name in fields})
     out = options.out or Path("runs") / name / options.task.rpartition(":")[2]
     try:
         result = imitate(recipe, options, out, policies)

@@ -1,26 +1,26 @@
 """A network learns a task of one arm or two from what cameras see: behaviour cloning in chunks.
 
-    pip install 'robot-layouts[preview,export]'
+    pip install 'robot-layouts[preview,light]'
     python examples/imitate_images.py TwoRobotLiftBar-v1
+    python examples/imitate_images.py PushCube-v1 --size 64 --visuals light --episodes 100
 
 It learns as the network of `imitate.py` does, but is not told where objects are: it gets small
-pictures of all cameras, and what real robots sense of themselves. The pictures are drawn from the
-recording, in processes, which takes a Vulkan driver. The same command goes on where it was stopped
-or killed, and equal commands make equal networks, to the last bit.
+pictures of all cameras, and what real robots sense of themselves. The pictures are recorded with
+the episodes, which takes a Vulkan driver. The same command goes on where it was stopped or killed,
+and equal commands make equal networks, to the last bit.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
-import h5py
 import numpy as np
 import torch
 from imitate import MODE, ChunkNetwork, ClonedPolicy, Recipe, Senses, Training, main, observe
@@ -28,13 +28,8 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 import tasks
-from robot_layouts.core.progress import Progress
-from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.playing.executor import choose_executor
 from robot_layouts.data.reading.recording import Recording
 from robots import TaskError
-from tasks.engine.cameras import by_place, cameras_of
-from tasks.engine.columns import ROBOMIMIC, picture_column
 
 OBSERVED = "rgb"
 FILE = "runs/imitate_images/TwoRobotLiftBar-v1/policy.pt"  # or what IMITATE_IMAGES_POLICY says
@@ -47,17 +42,21 @@ class PictureRecipe(Recipe):
 
     Attributes:
         size: Width and height of a picture (pixels).
+        visuals: Which meshes are drawn, ``"full"`` or ``"light"``.
     """
 
     episodes: int = 300
     steps: int = 4_000
     batch: int = 64
     size: int = 96
+    visuals: str = "full"
+    options: ClassVar[tuple[str, ...]] = ("size", "visuals")
 
     @property
     def making(self) -> dict[str, Any]:
         """How the task is made: arguments of `tasks.make`."""
-        return {"obs_mode": OBSERVED, "camera_size": (self.size, self.size)}
+        size = self.size, self.size
+        return {"obs_mode": OBSERVED, "camera_size": size, "visuals": self.visuals}
 
 
 @dataclass(frozen=True)
@@ -81,14 +80,12 @@ class RobotSenses(Senses):
     """What a network gets beside pictures: numbers that `OBSERVED` has, too."""
 
     def __init__(self, recipe: PictureRecipe) -> None:
-        """Ask the task what it tells beside pictures, and how its cameras are called."""
+        """Ask the task what it tells beside pictures."""
         super().__init__(recipe.task)
         env = tasks.make(recipe.task, **recipe.making)
         with closing(env):
             spaces = cast(Mapping[str, Any], env.observation_space)
             self._extra = sorted(spaces["extra"])  # as networks that were trained before know it
-            cameras = by_place(cameras_of(env.layout, env.cameras))
-        self.columns = [picture_column(ROBOMIMIC, camera, "rgb") for camera in cameras]
 
     def __call__(self, observation: Mapping[str, Any]) -> Tensor:
         """Return the numbers, (N, D), of what ``obs_mode="state_dict"`` or `OBSERVED` observes."""
@@ -96,39 +93,29 @@ class RobotSenses(Senses):
         return super().__call__({"agent": observation["agent"], "extra": told})
 
 
-def draw_pictures(recording: Path, recipe: PictureRecipe, out: Path, workers: int | None) -> Path:
-    """Draw what cameras see before every action, as a robomimic dataset; return its file."""
-    file = out / "image.hdf5"
-    if not file.exists():
-        size, executor = (recipe.size, recipe.size), choose_executor(workers)
-        wanted = Export(recording, "robomimic", out, cameras="all", size=size)
-        with Progress(recipe.episodes, "episodes") as line:
-            export(wanted, lambda done, _: line.update(int(done), "drawing"), executor=executor)
-    return file
+def pictures_of(observation: Mapping[str, Any]) -> Iterable[Any]:
+    """Return the pictures of each camera in an observation, (N, H, W, 3)."""
+    return (camera["rgb"] for camera in observation["sensor_data"].values())
 
 
-def load_pictures(file: Path, recording: Path, recipe: PictureRecipe, columns: list[str]) -> Tensor:
+def load_pictures(recording: Path, recipe: PictureRecipe) -> Tensor:
     """Return the pictures of what is learned from, one after the other, (N, 3 · C, H, W).
 
     Raises:
-        TaskError: If they are of other episodes than the recording's, or of another size.
+        TaskError: If they were not recorded, or are of another size.
     """
     pictures = list[NDArray[np.uint8]]()
-    with h5py.File(file) as dataset, Recording(recording) as episodes:
-        demos = cast(Mapping[str, Any], dataset["data"])
+    with Recording(recording) as episodes:
         for number in range(recipe.episodes):
-            if (episode := episodes[number]).solved:
-                demo = demos.get(f"demo_{len(pictures)}")
-                if demo is None or not np.array_equal(demo["actions"], episode.actions):
-                    raise TaskError(_stale(file, f"other episodes than {recording}"))
-                pictures.append(np.concatenate([demo["obs"][name] for name in columns], 3))
+            if episodes[number].solved:
+                seen = episodes.observations(number)
+                if not isinstance(seen, dict) or "sensor_data" not in seen:
+                    raise TaskError(f"{recording} holds no pictures; choose another folder")
+                before = [rows[:-1] for rows in pictures_of(cast("dict[str, Any]", seen))]
+                pictures.append(np.concatenate(before, 3))
                 if pictures[-1].shape[1:3] != (recipe.size, recipe.size):
-                    raise TaskError(_stale(file, f"pictures that are not {recipe.size} wide"))
+                    raise TaskError(f"{recording} has pictures that are not {recipe.size} wide")
     return torch.from_numpy(np.concatenate(pictures)).permute(0, 3, 1, 2).contiguous()
-
-
-def _stale(file: Path, what: str) -> str:
-    return f"{file} has {what}; remove it, or choose another folder with --out"
 
 
 class Eye(nn.Module):
@@ -191,8 +178,7 @@ class SeeingPolicy(ClonedPolicy):
         """Return what learns from a recording."""
         senses = RobotSenses(recipe)
         numbers, chunks = observe(recipe, recording, senses)
-        file = draw_pictures(recording, recipe, out / "pictures", workers)
-        sights = Sights(numbers, load_pictures(file, recording, recipe, senses.columns))
+        sights = Sights(numbers, load_pictures(recording, recipe))
         torch.manual_seed(recipe.seed)  # of the first weights
         sizes = numbers.shape[1], chunks.shape[1], recipe.width, recipe.blocks
         network = SeeingNetwork(*sizes, *sights.pictures.shape[1:3])
@@ -205,8 +191,8 @@ class SeeingPolicy(ClonedPolicy):
 
     def sense(self, observation: Mapping[str, Any]) -> Sights:
         """Return what the network gets of an observation."""
-        seen = [camera["rgb"] for camera in observation["sensor_data"].values()]
-        return Sights(self._senses(observation), torch.cat(seen, 3).permute(0, 3, 1, 2))
+        seen = torch.cat([*pictures_of(observation)], 3)
+        return Sights(self._senses(observation), seen.permute(0, 3, 1, 2))
 
 
 @cache

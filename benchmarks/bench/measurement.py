@@ -179,6 +179,7 @@ class Measurement:
             Samples of the same place were taken in the same round.
         floors: Series that nothing can beat: the physics alone.
         ratios: Pairs of series whose ratio matters.
+        conditions: On what it was measured, and how, if not as all others of a report.
     """
 
     name: str
@@ -189,6 +190,7 @@ class Measurement:
     samples: dict[str, list[list[float]]]
     floors: tuple[str, ...] = ()
     ratios: tuple[tuple[str, str], ...] = ()
+    conditions: str = ""
 
     def median(self, series: str, value: Value) -> float | None:
         """Return the median of a series at a value; None if there is no sample."""

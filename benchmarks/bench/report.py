@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +64,13 @@ class Report:
             f" {load}; {self.clock}; {packages}."
         )
 
+    def with_those_of(self, other: Report, order: Sequence[str]) -> Report:
+        """Return this report with what was measured in another run, and on what that was."""
+        known = {one.name: one for one in self.measurements}
+        said = other.conditions()
+        known |= {one.name: replace(one, conditions=said) for one in other.measurements}
+        return replace(self, measurements=tuple(known[name] for name in order if name in known))
+
     def as_json(self) -> str:
         """Return all of it as text in JSON."""
         found = {
@@ -102,7 +109,8 @@ class Report:
             MissingPackageError: If there is no matplotlib.
             UnwritableFileError: If it cannot be written (also an ``OSError``).
         """
-        figure = draw(self.measurements, self.conditions())
+        others = [f"{one.title}: {one.conditions}" for one in self.measurements if one.conditions]
+        figure = draw(self.measurements, " ".join([self.conditions(), *others]))
         with written_whole(path) as unfinished:
             figure.savefig(unfinished, format="png")
 

@@ -14,7 +14,7 @@ import torch
 from rich.console import Console
 from tqdm import tqdm
 
-from benchmarks.bench import environments, vectors
+from benchmarks.bench import cameras, environments, vectors
 from benchmarks.bench.measurement import BenchmarkError, Measurement, Settings
 from benchmarks.bench.report import PICTURE, RECORD, Report, machine, read_report, summary
 from benchmarks.records import DOCS
@@ -35,6 +35,8 @@ BENCHMARKS: Benchmarks = {
     "varying": environments.varying,
     "looks": environments.looks,
     "pictures": vectors.pictures,
+    "cameras": cameras.cameras,
+    "camera_rate": cameras.camera_rate,
     "environments": environments.environments,
     "workers": vectors.workers,
     "robots": environments.robots,
@@ -64,18 +66,22 @@ def bench(
 
     Args:
         settings: What is measured, and how often.
-        only: Benchmarks by name: step, reset, vector, varying, looks, pictures, environments,
-            workers, robots, contacts, memory, start, recording, validation (all).
+        only: Benchmarks by name: step, reset, vector, varying, looks, pictures, cameras,
+            camera_rate, environments, workers, robots, contacts, memory, start, recording,
+            validation (all).
         out: Write bench.json, bench.md and bench.png into this folder.
         native: Measure steps and resets of all clones, vectors and pictures beside native.
-        record: Keep all of it, beside native, in docs/benchmarks.json for the documentation.
+        record: Keep it, beside native, in docs/benchmarks.json for the documentation; with --only,
+            beside what was recorded before of the others.
 
     Raises:
         RobotLayoutsError: If an option is invalid, or nothing can be recorded.
     """
     own_tasks = settings.task != DEFAULTS.task
-    if record and (only or own_tasks or not native):
-        raise BenchmarkError("--record keeps every benchmark: give --native, no --only, no --task")
+    if record and (own_tasks or not (native or {*only}.isdisjoint(BESIDE_NATIVE) and only)):
+        raise BenchmarkError(
+            "--record keeps what is measured beside native: give --native, no --task"
+        )
     for kind in settings.kinds:
         RobotRegistry.load(kind)
     for name in only:
@@ -97,6 +103,7 @@ def bench(
         if report.left_out:
             missing = ", ".join(report.left_out)
             raise BenchmarkError(f"nothing is recorded, as {missing} was left out")
+        report = read_report().with_those_of(report, tuple(BENCHMARKS)) if only else report
         write_whole(RECORD, report.as_json())
         report.draw(PICTURE)
         print(f"{RECORD}: recorded; `python -m benchmarks tables` shows it in docs")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from pathlib import Path
@@ -46,8 +46,8 @@ def vectors(settings: Settings, native: bool = False) -> Measurement:
     samples: dict[tuple[str, str], list[float]] = {}
     for task_id in settings.vector_task:
         with ExitStack() as stack:
-            lockstep = stack.enter_context(_vector(task_id, num_envs, PROCESSES))
-            asynchronous = _vector(task_id, num_envs, PROCESSES, batch_size=batch)
+            lockstep = stack.enter_context(vector(task_id, num_envs, PROCESSES))
+            asynchronous = vector(task_id, num_envs, PROCESSES, batch_size=batch)
             timed = TimedVector(lockstep, clock, steps)
             rates: dict[str, Sample] = {
                 HERE: timed.rate,
@@ -80,7 +80,7 @@ def workers(settings: Settings) -> Measurement:
     samples: dict[tuple[str, int], list[float]] = {}
     with Helpers(max(1, *settings.workers), _do_physics, task_id, share) as floor:
         for count in settings.workers:
-            with _vector(task_id, max(1, count) * share, count) as env:
+            with vector(task_id, max(1, count) * share, count) as env:
                 timed = TimedVector(env, settings.clock, settings.batch_steps)
                 variants: dict[tuple[str, int], Sample] = {
                     (VECTOR, count): timed.rate,
@@ -98,7 +98,7 @@ def pictures(settings: Settings, native: bool = False) -> Measurement:
         raise BenchmarkError(f"no pictures can be drawn here: {problem}")
     task_id, clock = settings.task[0], settings.clock
     with ExitStack() as stack:
-        own = _vector(task_id, PROCESSES * settings.worker_envs, PROCESSES, obs_mode=OBS_MODE)
+        own = vector(task_id, PROCESSES * settings.worker_envs, PROCESSES, obs_mode=OBS_MODE)
         made = {VECTOR: (stack.enter_context(own), PICTURE_STEPS)}
         if native:
             other = stack.enter_context(closing(_native_vector(task_id, OBS_MODE)))
@@ -107,7 +107,9 @@ def pictures(settings: Settings, native: bool = False) -> Measurement:
             (name, task_id): TimedVector(env, clock, steps).rate
             for name, (env, steps) in made.items()
         }
-        floor = stack.enter_context(Helpers(PROCESSES, _draw, task_id))
+        floor = stack.enter_context(
+            Helpers(PROCESSES, draw_everything, task_id, {"obs_mode": OBS_MODE})
+        )
         variants[DRAWING, task_id] = lambda number: clock.rate(
             (DRAWN, seconds) for seconds in floor.ask([(DRAWN, clock)] * PROCESSES)
         )
@@ -123,7 +125,7 @@ def start(settings: Settings) -> Measurement:
 
     def seconds(count: int, number: int) -> float:
         begun = clock.now()
-        with _vector(task_id, count, min(count, CORES)) as env:
+        with vector(task_id, count, min(count, CORES)) as env:
             env.reset(seed=number)
             return clock.now(_worker_ids()) - begun
 
@@ -273,8 +275,9 @@ def _do_physics(pipe: Any, task_id: str, num_envs: int) -> None:
         pipe.send(sum(env.simulation.timed_step(action, clock.now) for action in actions))
 
 
-def _draw(pipe: Any, task_id: str) -> None:
-    env = tasks.make(task_id, obs_mode=OBS_MODE)
+def draw_everything(pipe: Any, task_id: str, making: Mapping[str, Any]) -> None:
+    """Draw a world in a process of `Helpers`, as often as asked."""
+    env = tasks.make(task_id, **making)
     env.reset(0)
     pipe.send(0.0)
     while True:
@@ -311,7 +314,8 @@ def _busy_core() -> Generator[Callable[[Sample, int], float]]:
 
 
 @contextmanager
-def _vector(task_id: str, num_envs: int, num_workers: int, **making: Any) -> Generator[Any]:
+def vector(task_id: str, num_envs: int, num_workers: int, **making: Any) -> Generator[Any]:
+    """Give a vector of environments."""
     name = f"RobotLayouts/{get_task_class(task_id).task_id}"
     env = gymnasium.make_vec(name, num_envs=num_envs, num_workers=num_workers, **making)
     with closing(env):
@@ -331,7 +335,7 @@ def _worker_ids() -> list[int]:
 def _private_memory(task_id: str, num_envs: int) -> float:
     """Return the memory that a worker with some environments shares with no one (MB)."""
     before = set(_worker_ids())
-    with _vector(task_id, num_envs, 1) as env:
+    with vector(task_id, num_envs, 1) as env:
         env.reset(seed=0)
         for action in random_actions(0, 5, num_envs, env.single_action_space.shape[0]):
             env.step(action)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
+from os import PathLike
 from typing import Any, cast
 
 import numpy as np
+from typing_extensions import NotRequired, TypedDict
 
 from layouts import Layout
 from robot_layouts.core.bounds import FAR, checked_numbers, checked_whole, shown
+from robot_layouts.core.schema import FieldError, Object, check
 from robot_layouts.simulation.scene.cameras import (
     DEFAULT_FOV,
     FIELD_OF_VIEW,
@@ -25,6 +28,7 @@ from robot_layouts.simulation.scene.cameras import (
 from robots import RobotLayoutsError, TaskError, UnknownNameError
 from robots.descriptor import IDENTITY, Vector3
 from tasks.native.format import observation_keys
+from tasks.randomization.declaration import read_data
 
 Size = tuple[int, int]
 """Width and height of a picture (pixels)."""
@@ -163,6 +167,72 @@ def plain(settings: Any) -> Any:
     if isinstance(settings, (tuple, list)):
         return [plain(value) for value in settings]
     return settings
+
+
+class CameraData(TypedDict):
+    """Cameras as plain data, by the arguments of `tasks.make`."""
+
+    cameras: NotRequired[list[Object]]
+    sensor_configs: NotRequired[Object]
+
+
+def load_cameras(path: str | PathLike[str]) -> dict[str, Any]:
+    """Return the cameras that a file declares, as arguments of `tasks.make`.
+
+    Args:
+        path: YAML or json: under ``cameras`` a list of cameras with the fields of
+            `tasks.Camera`, in the place of the task's own, under ``sensor_configs`` what of any
+            camera is otherwise; see `tasks.Scenario`. Both may be left out.
+
+    Raises:
+        TaskError: If the file cannot be read, or a camera is invalid; the message names the file.
+    """
+    data = _with_whole_sizes(read_data(path, "cameras"))
+    try:
+        check(data, CameraData, "")
+        for name in data:
+            if name not in CameraData.__annotations__:
+                raise UnknownNameError("entry", name, CameraData.__annotations__)
+        return cameras_again(data)
+    except (FieldError, RobotLayoutsError) as error:
+        raise TaskError(f"{path}: {error}") from error
+
+
+def cameras_again(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what `CameraData` says as arguments of `tasks.make`.
+
+    Raises:
+        RobotLayoutsError: If a camera is invalid.
+    """
+    known = [field.name for field in fields(Camera)]
+    for camera in data.get("cameras", ()):
+        for name in camera:
+            if name not in known:
+                raise UnknownNameError("field of a camera", name, known)
+        if "eye" not in camera:
+            raise TaskError(f"the camera {shown(camera)} has no eye: where it is (m)")
+    return {**data, "cameras": [Camera(**camera) for camera in data.get("cameras", ())]}
+
+
+def describe_cameras(cameras: Sequence[Camera], configs: Configs | None) -> dict[str, Any]:
+    """Return cameras as `CameraData`; nothing of what is not given."""
+    data = {"cameras": [asdict(camera) for camera in cameras], "sensor_configs": plain(configs)}
+    return {name: value for name, value in data.items() if value}
+
+
+def _with_whole_sizes(data: Any) -> Any:
+    """Return data of a YAML file, whose numbers are floats, with whole numbers of pixels."""
+    if isinstance(data, list):
+        return [_with_whole_sizes(value) for value in data]
+    if not isinstance(data, dict):
+        return data
+    named = cast("dict[str, Any]", data)
+    sizes = {n: int(x) for n, x in named.items() if n in ("width", "height") and _is_whole(x)}
+    return {name: _with_whole_sizes(value) for name, value in named.items()} | sizes
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, float) and value.is_integer()
 
 
 def _with(camera: AnyCamera, **changed: Any) -> AnyCamera:

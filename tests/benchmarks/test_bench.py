@@ -135,7 +135,7 @@ QUICK = ("reset", "step", "validation")  # the others start processes, draw, or 
 
 @pytest.mark.parametrize("name", quick_cases(BENCHMARKS, QUICK))
 def test_every_benchmark_measures(name, request):
-    if name in ("looks", "pictures"):
+    if name in ("looks", "pictures", "cameras", "camera_rate"):
         request.getfixturevalue("renderer")  # the one with which native draws later, too
     shares = []
     found = BENCHMARKS[name](replace(TINY, tick=shares.append))
@@ -211,7 +211,8 @@ class TestCommand:
             (("--kinds", "pandaa"), "Did you mean 'panda'?"),
             (("--robots", "1", "9"), "--robots is 9; it must be from 1 to 8"),
             (("--environments", "0"), "--environments is 0; it must be 1 or more"),
-            (("--record", "--native", "--only", "step"), "no --only, no --task"),
+            (("--record", "--only", "step"), "beside native: give --native, no --task"),
+            (("--record", "--native", "--task", "PushT-v1"), "give --native, no --task"),
         ],
     )
     def test_what_there_is_not_is_refused(self, tmp_path, capsys, options, message):
@@ -229,6 +230,15 @@ def test_a_report_is_read_as_it_was_written(tmp_path):
     assert numbers["median_ratios"] == {"step / physics": [2.5, 2.0]}
     with pytest.raises(BenchmarkError, match="nothing was measured of 'step'"):
         summary(report)
+
+
+def test_what_is_measured_later_says_on_what_it_was(tmp_path):
+    later = replace(report_of(replace(NAMES, unit="s")), load=(3.0, 9.0))
+    both = report_of(NUMBERS, NAMES).with_those_of(later, ("names", "more", "numbers"))
+    assert both.measurements == (replace(NAMES, unit="s", conditions=later.conditions()), NUMBERS)
+    assert "load average 3.0 to 9.0" in both.page()
+    both.write(tmp_path)
+    assert read_report(tmp_path / "bench.json") == both
 
 
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"measurements": [3]}'])

@@ -10,15 +10,13 @@ from platform import libc_ver
 
 import pytest
 
+from benchmarks.asking import EMULATOR, PLAIN, Setting, answers_under
 from benchmarks.processors import (
-    EMULATOR,
     EXPERT,
     PACKAGES,
     PICTURES,
-    PLAIN,
     PORTABLE,
     Played,
-    Setting,
     _driver,
     differences,
     drawings,
@@ -26,6 +24,7 @@ from benchmarks.processors import (
     play_under,
     settings,
 )
+from benchmarks.receipts import CELLS, STEPS, ways
 from robots import SimulationError
 
 RECORD = Path(__file__).parents[2] / "docs/processors.json"
@@ -68,7 +67,7 @@ def test_an_emulated_processor_computes_the_same():
 
 @pytest.mark.long
 def test_a_process_that_ends_too_early_is_reported():
-    with pytest.raises(SimulationError, match="after 0 of 1 episodes"):
+    with pytest.raises(SimulationError, match="after 0 of 1 answers"):
         play_under(Setting("", {}), [Played("PickCubr-v1", 0, EXPERT, 0)])
 
 
@@ -82,6 +81,35 @@ def test_pictures_are_the_same_with_vectors_of_512_bits(renderer):
     assert len(plain[0]) == 12  # four cameras, three textures
     assert wide == plain
     assert narrow != plain
+
+
+@pytest.mark.long
+def test_a_receipt_of_pictures_is_verified_with_other_threads_but_not_without_avx(
+    renderer, tmp_path
+):
+    if "llvmpipe" not in _driver():
+        pytest.skip("these variables are of Mesa's software driver alone")
+    request = {"task": "PickCube-v1", "file": str(tmp_path / "a.json"), "workers": 0, "count": 2}
+    found = {
+        name: answers_under(ways()[name].setting, "benchmarks.receipts", request, 1)[0]
+        for name in ("as it was written", "two threads", "SSE")
+    }
+    pictures = 2 * (STEPS + 1) * 2  # of two episodes by two cameras
+    same = {"episodes": 2, "pictures": pictures, "equal": 2, "other_pictures": 0}
+    assert found["two threads"] == same
+    assert found["as it was written"] == found["two threads"]
+    assert found["SSE"]["equal"] < 2
+
+
+def test_the_page_says_where_receipts_are_equal():
+    record = json.loads(RECORD.read_text())["receipts"]
+    known = ways()
+    assert {name for name, way in known.items() if not way.setting.emulated} <= {*record["ways"]}
+    for name, way in record["ways"].items():
+        assert list(way["cells"]) == list(CELLS)
+        for cell, seen in way["cells"].items():
+            whole = seen["equal"] == seen["episodes"] and not seen["other_pictures"]
+            assert whole == (name != "SSE"), (name, cell)
 
 
 def test_the_page_says_which_pictures_differ():

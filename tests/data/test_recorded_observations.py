@@ -83,6 +83,11 @@ def test_options_that_need_each_other(pushed: Path, words: list[str], capsys):
     assert "--obs-mode and --out go together" in capsys.readouterr().err
 
 
+def test_cameras_are_refused_where_nothing_is_drawn(pushed: Path, capsys):
+    assert main(["replay", str(pushed), "--visuals", "light"]) == 1
+    assert "nothing is drawn without --obs-mode and --out" in capsys.readouterr().err
+
+
 def test_what_is_damaged_is_noticed_and_recorded_again(pushed: Path, tmp_path: Path):
     path = observed_again(pushed, tmp_path / "seen", "state_dict")
     before = path.read_bytes()

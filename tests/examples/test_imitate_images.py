@@ -4,15 +4,14 @@ import json
 import pickle
 from contextlib import closing
 from dataclasses import replace
-from shutil import copytree
 
-import h5py
 import pytest
 import torch
 
 pytest.importorskip("matplotlib")
 
 import tasks
+from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate, record
 from robot_layouts.data.reading.recording import Recording
 from robots import TaskError
@@ -22,6 +21,7 @@ __all__ = ["examples"]
 
 TASK = "PushCube-v1"
 WORDS = [TASK, "--episodes", "2", "--steps", "25", "--examined", "1", "--tests", "1"]
+WORDS += ["--size", "32"]
 
 pytestmark = pytest.mark.long  # they record and learn
 
@@ -49,8 +49,8 @@ def learned(example, kept):
     return kept
 
 
-def test_it_records_draws_learns_and_leaves_its_files(learned):
-    names = {"learning_curve.json", "learning_curve.png", "policy.pt", "recording", "pictures"}
+def test_it_records_learns_and_leaves_its_files(learned):
+    names = {"learning_curve.json", "learning_curve.png", "policy.pt", "recording"}
     assert {path.name for path in learned.iterdir()} == names
     curve = json.loads((learned / "learning_curve.json").read_text())["curve"]
     assert [point["steps"] for point in curve] == [5, 10, 15, 20, 25]
@@ -77,35 +77,37 @@ def test_what_it_learned_from_is_what_it_gets_when_it_plays(example, learned):
             assert torch.equal(seen.pictures, then.pictures)
             first += len(episode.actions)
     assert first == len(sights.pictures) == len(sights.numbers)
-    assert seen.pictures.shape == (1, 3, 96, 96)
+    assert seen.pictures.shape == (1, 3, 32, 32)
 
 
-def test_pictures_of_another_recording_are_refused(example, learned, tmp_path, capsys):
-    copytree(learned / "pictures", tmp_path / "pictures")
-    from imitate import shaking
-
-    shaken = shaking(example.PictureRecipe(TASK))
-    record(TASK, range(5, 7), tmp_path / "recording", workers=0, randomization=shaken)
-    other = ["--recording", str(tmp_path / "recording"), "--workers", "0"]
-    assert example.run([*WORDS, *other, "--out", str(tmp_path)]) == 1
-    assert "image.hdf5 has other episodes than" in capsys.readouterr().err
-    assert not (tmp_path / "policy.pt").exists()
+def test_a_recording_without_pictures_or_with_others_is_refused(example, learned, tmp_path):
+    recipe = example.PictureRecipe(TASK, episodes=1)
+    with pytest.raises(TaskError, match="has pictures that are not 96 wide"):
+        example.load_pictures(learned / "recording", recipe)
+    record(TASK, [0], tmp_path, workers=0)
+    with pytest.raises(TaskError, match="holds no pictures; choose another folder"):
+        example.load_pictures(tmp_path, recipe)
 
 
-def test_more_pictures_than_wanted_serve_but_not_fewer_or_smaller(example, learned, tmp_path):
-    file = copytree(learned / "pictures", tmp_path / "pictures") / "image.hdf5"
-    recipe, recording = example.PictureRecipe(TASK, episodes=2), learned / "recording"
-    columns = example.RobotSenses(recipe).columns
-    one = example.load_pictures(file, recording, replace(recipe, episodes=1), columns)
-    both = example.load_pictures(file, recording, recipe, columns)
+def test_fewer_episodes_than_there_are_will_do(example, learned):
+    recipe = example.PictureRecipe(TASK, episodes=2, size=32)
+    both = example.load_pictures(learned / "recording", recipe)
+    one = example.load_pictures(learned / "recording", replace(recipe, episodes=1))
     assert torch.equal(one, both[: len(one)])
     assert len(one) < len(both)
-    with pytest.raises(TaskError, match="not 64 wide; remove it, or choose another folder"):
-        example.load_pictures(file, recording, replace(recipe, size=64), columns)
-    with h5py.File(file, "a") as dataset:
-        del dataset["data/demo_1"]
-    with pytest.raises(TaskError, match="other episodes"):
-        example.load_pictures(file, recording, recipe, columns)
+
+
+def test_a_receipt_of_what_was_learned_is_verified_with_its_pictures(
+    example, learned, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("IMITATE_IMAGES_POLICY", str(learned / "policy.pt"))
+    receipt, policy = str(tmp_path / "receipt.json"), ["--policy", "imitate_images:policy"]
+    words = ["--task", TASK, "--episodes", "2", "--obs-mode", "rgb", "--camera-size", "32x32"]
+    words += ["--control-mode", "pd_joint_pos", "--workers", "0", "--receipt", receipt]
+    assert main(["evaluate", *policy, *words]) == 0
+    episodes = json.loads((tmp_path / "receipt.json").read_text())["episodes"]
+    assert all("base_camera/rgb" in episode["pictures"] for episode in episodes)
+    assert main(["verify", receipt, *policy, "--num-envs", "2", "--workers", "0"]) == 0
 
 
 def test_it_is_not_told_where_objects_are(example, learned):

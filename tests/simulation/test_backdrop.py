@@ -68,10 +68,12 @@ def expect_same(simulation: Simulation) -> None:
 
 
 def whole_pictures(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Count how often everything is drawn at once."""
+    """Count for how many cameras everything is drawn at once, each time that it is."""
     found: list[int] = []
     whole = Studio._whole
-    monkeypatch.setattr(Studio, "_whole", lambda *args: (found.append(0), whole(*args))[1])
+    monkeypatch.setattr(
+        Studio, "_whole", lambda *args: (found.append(len(args[1])), whole(*args))[1]
+    )
     return found
 
 
@@ -145,6 +147,7 @@ def test_of_two_surfaces_in_one_place_the_order_decides(monkeypatch: pytest.Monk
         at_once = whole_pictures(monkeypatch)
         simulation.look(0, CAMERAS, ("rgb",), markers=False)
         assert at_once, "nothing noticed that both are equally far away"
+        assert sum(at_once) < len(CAMERAS), "one of them looks away, and is drawn again"
         expect_same(simulation)
 
 

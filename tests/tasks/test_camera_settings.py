@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +15,8 @@ import torch
 
 import tasks
 from robot_layouts.simulation import Camera
-from robots import RobotLayoutsError, RobotRegistry, SimulationError
+from robots import RobotLayoutsError, RobotRegistry, SimulationError, TaskError
+from tasks.engine.cameras import cameras_again, describe_cameras, load_cameras
 from tests.tasks.test_cameras import drawing, drawn, seen  # noqa: F401
 
 TASK = "PickCube-v1"
@@ -244,3 +247,42 @@ def test_shaders_that_do_not_tell_what_is_asked_for():
         SimulationError, match="shaders 'minimal', which tell no normal; 'default' do"
     ):
         tasks.make(TASK, obs_mode="rgb+normal", sensor_configs={"shader_pack": "minimal"})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("camera: []", "unknown entry 'camera'. Did you mean 'cameras'?"),
+        ("cameras: {eye: [0, 0, 1]}", "cameras is {'eye': [0.0, 0.0, 1.0]}; it must be"),
+        ("cameras: [{eye: [0, 0, 1], targt: [0, 0, 0]}]", "Did you mean 'target'?"),
+        ("cameras: [{target: [0, 0, 0]}]", "has no eye: where it is (m)"),
+        ("cameras: [{eye: [0, 0, 1]}]", "neither target and quaternion"),
+        ("cameras: [{eye: [0, 0, 1], target: [1, 0, 0], width: 2.5}]", "must be an integer"),
+        ("sensor_configs: 3", "sensor_configs is 3.0; it must be an object"),
+        ("cameras: [", "this is not YAML"),
+        ("nothing", "it is 'nothing'; it must be an object"),
+    ],
+)
+def test_a_file_that_declares_no_cameras(tmp_path: Path, text: str, message: str):
+    path = tmp_path / "cameras.yaml"
+    path.write_text(text)
+    with pytest.raises(TaskError) as caught:
+        load_cameras(path)
+    assert message in str(caught.value)
+    assert str(path) in str(caught.value)
+
+
+def test_a_file_declares_what_python_does(tmp_path: Path):
+    path = tmp_path / "cameras.yaml"
+    path.write_text("""
+cameras:
+  - {eye: [0.3, 0, 0.6], target: [-0.1, 0, 0.1], width: 48, height: 32}
+sensor_configs:
+  near: 0.02
+  base_camera: {fov: 1, width: 24}
+""")
+    configs = {"near": 0.02, "base_camera": {"fov": 1.0, "width": 24}}
+    assert load_cameras(path) == {"cameras": [SMALL], "sensor_configs": configs}
+    described = describe_cameras([SMALL], configs)
+    assert cameras_again(json.loads(json.dumps(described))) == load_cameras(path)
+    assert describe_cameras([], None) == {}

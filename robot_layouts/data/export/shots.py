@@ -13,7 +13,14 @@ from robot_layouts.simulation.rendering import SIZE
 from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera
 from robots import TaskError, UnknownNameError
 from tasks import TaskEnv
-from tasks.engine.cameras import Size, by_place, cameras_of, expect_apart, resized
+from tasks.engine.cameras import (
+    Size,
+    by_place,
+    cameras_of,
+    configured,
+    expect_apart,
+    resized,
+)
 from tasks.engine.columns import OVERVIEW, Viewpoint, overview
 
 ALL = "all"  # every camera of the task and its robots
@@ -105,7 +112,8 @@ def choose_shots(
         TaskError: If no camera is left to be drawn, two are called the same, or a name cannot be
             that of a file.
     """
-    known = by_place(cameras_of(task.layout, task.scenario.cameras or task.cameras))
+    cameras = cameras_of(task.layout, task.scenario.cameras or task.cameras)
+    known = by_place(configured(cameras, task.scenario.sensor_configs or {}, "sensor_configs"))
     expect_apart([*known, OVERVIEW])
     _expect_file_names(known)
     for name in names:

@@ -11,11 +11,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
-from robot_layouts.core.cli import Word, at_least
+from robot_layouts.core.cli import File, Word, at_least
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, check_timeout
 from robots import CONTROL_MODES, TaskError
 from robots.control_modes import read_mode
 from tasks.cell_options import RecordedCell
+from tasks.engine.cameras import load_cameras
+from tasks.engine.scenario import VISUALS
 
 if TYPE_CHECKING:
     from robot_layouts.core.progress import Progress
@@ -70,25 +72,53 @@ ControlMode = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True)
-class Acting:
+class Observing:
+    """What is observed, by which cameras.
+
+    Attributes:
+        obs_mode: What to observe: state, state_dict, rgb and others (state).
+        camera_size: Width and height in pixels of the pictures observed (each camera's own).
+        cameras: Cameras in place of the task's, and settings of any (.yaml).
+        visuals: Draw robots as their files have them, or with fewer triangles (full).
+    """
+
+    obs_mode: Annotated[str, Word("MODE")] | None = None
+    camera_size: PictureSize | None = None
+    cameras: File | None = None
+    visuals: Annotated[str, Word(choices=VISUALS)] | None = None
+
+    def observing(self) -> dict[str, Any]:
+        """Return those that are given as arguments of `tasks.make`.
+
+        Raises:
+            TaskError: If the cameras cannot be read, or one is invalid.
+        """
+        names = ("obs_mode", "camera_size", "visuals")
+        given = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return given | ({} if self.cameras is None else load_cameras(self.cameras))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Acting(Observing):
     """Who acts, on what it observes, and what its actions ask for.
 
     Attributes:
         policy: A policy that can be imported; by default the task's expert.
-        obs_mode: What policies observe: state, state_dict, rgb and others (state).
-        camera_size: Width and height in pixels of the pictures observed (each camera's own).
         control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
     """
 
     policy: Policy = "expert"
-    obs_mode: Annotated[str, Word("MODE")] | None = None
-    camera_size: PictureSize | None = None
     control_mode: ControlMode | None = None
 
     def playing(self) -> dict[str, Any]:
-        """Return these options as arguments of what plays."""
-        given = vars(self)
-        return {name: value for name, value in given.items() if (name, value) != ("obs_mode", None)}
+        """Return these options as arguments of what plays.
+
+        Raises:
+            TaskError: See `Observing.observing`.
+        """
+        observed = Observing.__dataclass_fields__
+        own = {name: value for name, value in vars(self).items() if name not in observed}
+        return {**own, **self.observing()}
 
 
 @dataclass(frozen=True, kw_only=True)

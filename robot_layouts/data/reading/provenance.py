@@ -47,7 +47,8 @@ from robots.fingerprint import asset_fingerprint
 from robots.mjcf.locator import is_mjcf
 from robots.urdf.cleaning.cleaning import is_template
 from robots.urdf.summary import MAX_URDF_BYTES
-from tasks import TaskEnv
+from tasks import Scenario, TaskEnv
+from tasks.engine.cameras import CameraData, describe_cameras
 from tasks.native.format import observation_keys
 from tasks.registry import full_name
 
@@ -101,8 +102,13 @@ class _Simulation(TypedDict, total=False):
     randomization: Object
 
 
+class _DrawnWith(CameraData):
+    visuals: NotRequired[Name]
+
+
 LAYOUT = dict[str, _PlaceJson] | None
 SIMULATION = _Simulation | None
+PICTURES = _DrawnWith | None
 
 
 def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
@@ -159,6 +165,12 @@ def describe_simulation(task: TaskEnv) -> dict[str, Any]:
         "control_frequency": task.scenario.control_frequency,
         **({"randomization": randomization.to_json()} if randomization else {}),
     }
+
+
+def describe_pictures(scenario: Scenario) -> dict[str, Any]:
+    """Return with what cameras and meshes a task's pictures are drawn, as far as it was chosen."""
+    visuals = {} if scenario.visuals == "full" else {"visuals": scenario.visuals}
+    return {**visuals, **describe_cameras(scenario.cameras, scenario.sensor_configs)}
 
 
 def read_described(texts: Mapping[str, str], name: str, kind: Any) -> Any:
@@ -293,6 +305,7 @@ def describe_task(
     """
     name, guessed = full_name(task.task_class), describe_guessed(task.scenario.layout)
     size = task.scenario.camera_size if observed else None
+    pictures = describe_pictures(task.scenario) if observed else None
     return {
         "env_info": {
             "env_id": task.task_id,
@@ -310,6 +323,7 @@ def describe_task(
         "source_desc": source_desc,
         "layout": describe_layout(task.layout),
         "simulation": describe_simulation(task),
+        **({"pictures": pictures} if pictures else {}),
         **({"guessed": guessed} if guessed else {}),
     }
 

@@ -12,7 +12,7 @@ from robot_layouts.data.reading.provenance import guess_again
 from robot_layouts.data.reading.recording import Recording
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 from tasks import MultiRobotTask, TaskEnv, get_task_class, make
-from tasks.engine.cameras import Size
+from tasks.engine.cameras import cameras_again
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
 from tasks.randomization.declaration import Randomization
@@ -57,10 +57,11 @@ def task_for(
     robots: RobotLike | Mapping[str, RobotLike] | None = None,
     bystanders: str | None = None,
     pictures: bool = False,
-    obs_mode: str = "none",
-    camera_size: Size | None = None,
+    **observing: Any,
 ) -> TaskEnv:
     """Make the task that a file was recorded in, with its robots where they stood.
+
+    It has the cameras and meshes with which the file's observations were drawn, if it holds any.
 
     Args:
         file: The recording.
@@ -68,8 +69,8 @@ def task_for(
         robots: Which robots these were, where the file cannot say it; the same are needed.
         bystanders: What those without a place did, where the file cannot say it.
         pictures: Whether to draw its worlds.
-        obs_mode: What it observes.
-        camera_size: Width and height of what cameras observe (pixels); None: each camera's own.
+        observing: What it observes, and with what that is drawn, as arguments of `tasks.make`;
+            nothing if ``obs_mode`` is not among them.
 
     Raises:
         UnknownNameError: If there is no such task.
@@ -86,10 +87,9 @@ def task_for(
     if "control_frequency" in (file.simulation or {}):
         making["control_frequency"] = file.simulation["control_frequency"]
     making["randomization"] = _varied(file)
+    making |= {"obs_mode": "none", **_drawn_with(file), **observing}
     task = make(
         file.task_id,
-        obs_mode=obs_mode,
-        camera_size=camera_size,
         control_mode=mode_by_arm(file.control_mode, making["layout"] or cls.layout),
         render_mode="rgb_array" if pictures else None,
         **making,
@@ -108,6 +108,14 @@ def _varied(file: Recording) -> Randomization | None:
         raise TrajectoryError(
             f"{file.path} has a randomization that is invalid here: {error}"
         ) from error
+
+
+def _drawn_with(file: Recording) -> dict[str, Any]:
+    """Return with what the observations of a recording were drawn, as arguments of `tasks.make`."""
+    try:
+        return cameras_again(file.pictures or {})
+    except RobotLayoutsError as error:
+        raise TrajectoryError(f"{file.path} has cameras that are invalid here: {error}") from error
 
 
 def _recorded(

@@ -37,6 +37,7 @@ from robot_layouts.data.reading.provenance import (
     OBSERVATIONS,
     OBSERVED,
     ORDER,
+    PICTURES,
     SIMULATION,
     STATES,
     TEXTS,
@@ -130,6 +131,7 @@ class Recording(Sequence[Trajectory]):
         guessed: What `robot_layouts.data.reading.provenance.describe_guessed` wrote, or None.
         simulation: What `describe_simulation` wrote; None in native's
             files.
+        pictures: What `robot_layouts.data.reading.provenance.describe_pictures` wrote, or None.
         action_split: Robot name → slice of the flat action; None in native's files.
         seeds: Reset seed of each episode, or None.
         sources: Who acted in each episode of the first file, or None; see `Trajectory`.
@@ -158,7 +160,7 @@ class Recording(Sequence[Trajectory]):
         self.max_episode_steps = first.summary.max_episode_steps
         self.source_type = first.summary.source_type
         self.layout, self.simulation = first.common["layout"], first.common["simulation"]
-        self.guessed = first.common["guessed"]
+        self.guessed, self.pictures = first.common["guessed"], first.common["pictures"]
         self.action_split = first.action_split
         self.sources = tuple(entry.source for entry in first.entries)
         self.seeds, counts = first.seeds, [len(first.entries)]
@@ -339,7 +341,8 @@ class _File:
         self.seeds = tuple(entry.seed for entry in self.entries)
         with self._damage("this h5 file"):
             self.hdf5 = Hdf5File(path)
-            described = self.hdf5.texts(names=("layout", "simulation", "guessed")) or {}
+            names = ("layout", "simulation", "guessed", "pictures")
+            described = self.hdf5.texts(names=names) or {}
             layout = read_described(described, "layout", LAYOUT)
             self.action_split = action_split(layout) if layout else None
             self.common: dict[str, Any] = {  # to all files of a recording
@@ -348,6 +351,7 @@ class _File:
                 "layout": layout,
                 "simulation": read_described(described, "simulation", SIMULATION),
                 "guessed": read_described(described, "guessed", GUESSED),
+                "pictures": read_described(described, "pictures", PICTURES),
             }
 
     def read(self, entry: EpisodeEntry) -> Trajectory:

@@ -13,7 +13,7 @@ from robot_layouts.core.commands import printable
 from robot_layouts.core.progress import Progress
 from robot_layouts.data.playing.command_options import (
     GOES_ON,
-    PictureSize,
+    Observing,
     RecordingOption,
     WorkerOptions,
     megabytes,
@@ -102,10 +102,10 @@ def replay_recording(
     start: Start = "seed",
     cell: Mapping[str, Any] | None = None,
     obs_mode: str | None = None,
-    camera_size: tuple[int, int] | None = None,
     folder: Path | None = None,
     file_size: float = FILE_SIZE,
     on_event: Callable[[ReplaySummary, Event | None], None] = lambda summary, event: None,
+    **observing: Any,
 ) -> ReplaySummary:
     """Play a recording again, and record what is observed in it.
 
@@ -119,10 +119,11 @@ def replay_recording(
         start: See `robot_layouts.data.playing.replay.replay`.
         cell: Where robots stood and which, where the file cannot say it; see `task_for`.
         obs_mode: What to observe; None: nothing.
-        camera_size: Width and height of what cameras observe (pixels); None: each camera's own.
         folder: Where ``trajectory.h5`` and ``trajectory.json`` with the observations are written.
         file_size: Size at which a further h5 file is begun (MB); see `Recorder`.
         on_event: Called once at the start without an event, and after every event.
+        observing: With what that is drawn, as arguments of `tasks.make`, where it is otherwise than
+            in the recording: ``camera_size``, ``cameras``, ``sensor_configs``, ``visuals``.
 
     Raises:
         TrajectoryError: If an episode cannot be played like that.
@@ -134,7 +135,9 @@ def replay_recording(
     """
     if (obs_mode is None) != (folder is None) or (folder is not None and start == "state"):
         raise TaskError("--obs-mode and --out go together, and not with --from state")
-    places, observing = places_by_seed(file, count), dict[str, Any]()
+    if observing and folder is None:
+        raise TaskError("nothing is drawn without --obs-mode and --out, so cameras do not matter")
+    places = places_by_seed(file, count)
     if places is None:
         if folder is not None or not isinstance(executor, InProcessExecutor):
             raise TaskError(
@@ -144,7 +147,7 @@ def replay_recording(
         places = dict(zip(*[range(len(file.seeds[:count]))] * 2, strict=True))
     summary, recorder = ReplaySummary(len(places)), None
     if folder is not None:
-        observing = {"obs_mode": obs_mode, "camera_size": camera_size}
+        observing["obs_mode"] = obs_mode
         recorder = _recorder(file, folder, file_size, {**(cell or {}), **observing})
     with nullcontext() if recorder is None else recorder:
         there = set[int]() if recorder is None else recorder.seeds
@@ -202,8 +205,7 @@ def replay_command(
     *,
     episodes: int | None = None,
     from_: Start = "seed",
-    obs_mode: Annotated[str, Word("MODE")] | None = None,
-    camera_size: PictureSize | None = None,
+    observing: Observing,
     out: Folder | None = None,
     file_size: Annotated[float, Word("MB", megabytes)] = FILE_SIZE,
     workers: WorkerOptions,
@@ -223,8 +225,7 @@ def replay_command(
         recording: The recording.
         episodes: Play the first N episodes (all).
         from_: Begin by a reset with the recorded seed, or, not exactly, from the recorded state.
-        obs_mode: What to observe: state, state_dict, rgb and others.
-        camera_size: Width and height in pixels of the pictures observed (each camera's own).
+        observing: What is observed.
         out: Folder of the trajectory.h5 and .json that hold what was observed.
         file_size: Begin another file, trajectory_0001.h5 and so on, when one is so large.
         workers: Who plays.
@@ -254,11 +255,10 @@ def replay_command(
                 count=count,
                 start=from_,
                 cell=recording.cell.making(),
-                obs_mode=obs_mode,
-                camera_size=camera_size,
                 folder=out,
                 file_size=file_size,
                 on_event=show,
+                **observing.observing(),
             )
         title = f"{file.path}: {file.task_id}, {file.control_mode}"
     console.print(printable(title), soft_wrap=True)

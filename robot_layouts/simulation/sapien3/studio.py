@@ -166,9 +166,7 @@ class Studio:
             for shot in placed:
                 backdrop = backdrops.get(shot.camera)
                 images = backdrop.behind(shot.camera, shot.images) if backdrop else shot.pictures()
-                if images is None:
-                    return self._whole(placed)()
-                found.append(_view(shot, images))
+                found += self._whole([shot])() if images is None else [_view(shot, images)]
             return found
 
         return views
