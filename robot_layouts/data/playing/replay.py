@@ -318,7 +318,7 @@ class RecordedJob:
         return None
 
     def play(self, task: TaskEnv, episode: Trajectory, tools: Any) -> Any:
-        """Return what comes of an episode."""
+        """Return the result of an episode."""
         raise NotImplementedError
 
 
@@ -337,7 +337,7 @@ class RecordedPlay:
         self._tools = job.tools(self._task)
 
     def __call__(self, seed: int) -> Any:
-        """Return what comes of the episode of a seed."""
+        """Return the result of the episode of a seed."""
         job = self._job
         return job.play(self._task, self._file[job.places[seed]], self._tools)
 
