@@ -30,7 +30,7 @@ Importing this loads none of it: each name is imported when it is first used.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from robot_layouts.core.module_names import missing_name
+from robot_layouts.core.errors import missing_name
 
 if TYPE_CHECKING:
     from layouts import (

@@ -1,13 +1,11 @@
 """``robot-layouts COMMAND``, and the same as ``python -m robot_layouts COMMAND``.
 
-``python -m tasks`` runs whatever is called ``tasks`` in the present folder. A console script looks
-for this library first: the folder comes last, for the modules of tasks, experts and policies.
+``python -m layouts`` runs whatever is called ``layouts`` in the present folder. A console script
+looks for this library first: the folder comes last, for the modules of tasks, experts and policies.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
 from typing import NoReturn
 
 from robot_layouts.core.cli import Command, Program
@@ -69,13 +67,6 @@ main = PROGRAM.main
 def run() -> NoReturn:
     """Be the console script."""
     start(main)
-
-
-def main_of(name: str) -> Callable[..., int]:
-    """Return what ``python -m`` runs for a command, or for all with the same first word."""
-    return lambda arguments=None: main(
-        [*name.split(), *(sys.argv[1:] if arguments is None else arguments)]
-    )
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ expect_own("robots", "objects", "layouts")
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from robot_layouts.core.module_names import missing_name
+from robot_layouts.core.errors import missing_name
 from tasks.interfaces import lerobot_vec_env, parallel_env, register, sb3_vec_env
 from tasks.registry import get_task_class, list_clones, list_tasks, make, on_registration
 

@@ -47,6 +47,19 @@ def leaves(tree: Any, name: str = "", nothing: Any = None) -> Iterator[tuple[str
         yield name, tree
 
 
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a mapping by ``a/b/c`` as mappings of mappings; a name ``a/b/`` is an empty one."""
+    tree: dict[str, Any] = {}
+    for name, value in flat.items():
+        *above, last = name.split("/")
+        branch = tree
+        for step in above:
+            branch = branch.setdefault(step, {})
+        if last:
+            branch[last] = value
+    return tree
+
+
 def stacked(rows: Sequence[Any]) -> Any:
     """Return nested mappings of arrays, all alike, or arrays, as one with a first axis more."""
     if isinstance(rows[0], Mapping):

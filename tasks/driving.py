@@ -2,61 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-
 import numpy as np
 
 from layouts import Layout
 from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate, xyz_angles
 from robot_layouts.simulation import State
+from robot_layouts.simulation.control.joint_positions import DrivenGroup, driven_groups
 from robots import JointGroup
 from tasks.engine.env import TaskEnv
 
 _NEARLY = 1.0 + 1e-4  # of a normalised number that is just at its bound
 
 
-@dataclass(frozen=True)
-class DrivenGroup:
-    """A joint group of a layout, in its control mode.
-
-    Attributes:
-        robot: Name of its robot in the layout.
-        name: Its own.
-        arm: The robot or limb that it belongs to; None if that has no TCP.
-        group: What is driven, and how.
-        numbers: Where its numbers stand in an action.
-        joints: Where its joints are among those of all robots.
-    """
-
-    robot: str
-    name: str
-    arm: str | None
-    group: JointGroup
-    numbers: slice
-    joints: slice
-
-
-def driven_groups(layout: Layout) -> Iterator[DrivenGroup]:
-    """Yield the joint groups of a layout, also those that are held, in the order of the action."""
-    arms = layout.arms_by_group
-    number = joint = 0
-    for robot, placement in layout.items():
-        for name, group in placement.robot.action_split.groups.items():
-            numbers = slice(number, number + group.size)
-            joints = slice(joint, joint + len(group.joints))
-            yield DrivenGroup(robot, name, arms.get((robot, name)), group, numbers, joints)
-            number, joint = numbers.stop, joints.stop
-
-
 def joint_slices(layout: Layout) -> dict[str, slice]:
     """Return where each robot's joints are among those of all."""
-    slices: dict[str, slice] = {}
-    first = 0
-    for name, placement in layout.items():
-        slices[name] = slice(first, first + placement.robot.dof)
-        first += placement.robot.dof
-    return slices
+    return {driven.robot: driven.own for driven in driven_groups(layout)}
 
 
 class PositionDrive:

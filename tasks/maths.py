@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, NoReturn
 
-from robot_layouts.core.module_names import missing_name
+from robot_layouts.core.errors import missing_name
 from robot_layouts.simulation.maths import (
     Array,
     Flags,

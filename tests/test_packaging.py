@@ -10,7 +10,7 @@ from importlib import metadata
 import pytest
 import yaml
 
-from robot_layouts.core.rooms import PACKAGES
+from robot_layouts.core.own_packages import PACKAGES
 from tests.checkout import ROOT, tracked_files
 
 if sys.version_info >= (3, 11):

@@ -169,3 +169,17 @@ def _rebuild_unknown_name(
     error = UnknownNameError(kind, name, choices)
     error.args = (message,)
     return error
+
+
+def missing_name(module: str, name: str, names: Iterable[str]) -> AttributeError:
+    """Return what a module's ``__getattr__`` raises for a name that is missing.
+
+    Args:
+        module: The module.
+        name: What it was asked for.
+        names: What it has.
+    """
+    names = sorted(names)
+    match = closest_match(name, names)
+    suggestion = f" Did you mean {match!r}?" if match else ""
+    return AttributeError(f"{module} has no {name!r}.{suggestion} It has {', '.join(names)}.")

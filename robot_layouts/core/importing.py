@@ -7,7 +7,7 @@ from typing import Any
 
 from robot_layouts.core.catalogue import reason
 from robot_layouts.core.errors import MissingPackageError, RobotLayoutsError, closest_match
-from robot_layouts.core.rooms import PACKAGES
+from robot_layouts.core.own_packages import PACKAGES
 
 
 def optional(module: str, what: str, extra: str) -> Any:

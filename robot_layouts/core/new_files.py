@@ -11,7 +11,7 @@ from keyword import iskeyword
 from pathlib import Path
 
 from robot_layouts.core.errors import RobotLayoutsError, UnwritableFileError
-from robot_layouts.core.rooms import PACKAGES
+from robot_layouts.core.own_packages import PACKAGES
 
 
 def check_module_name(module: str, better: str, error: type[RobotLayoutsError]) -> None:

@@ -1,10 +1,26 @@
-"""Whether the packages that one imports are this library's, and not a user's of the same name."""
+"""The packages of this library, the folders that play episodes, and packages that hide one."""
 
 from __future__ import annotations
 
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
+
+PACKAGES = ("robots", "objects", "layouts", "tasks", "robot_layouts")
+
+PLAYING = (
+    "robot_layouts/core",
+    "robot_layouts/kinematics",
+    "robots",
+    "objects",
+    "layouts",
+    "robot_layouts/motion",
+    "robot_layouts/simulation",
+    "tasks",
+    "robot_layouts/experts",
+    "robot_layouts/data/playing",
+)
+"""What has a part in an episode; the rest of `robot_layouts.data` only writes things down."""
 
 _HOME = Path(__file__).resolve().parents[2]
 

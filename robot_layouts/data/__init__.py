@@ -7,7 +7,7 @@ expect_own("robots", "layouts", "tasks")
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from robot_layouts.core.module_names import missing_name
+from robot_layouts.core.errors import missing_name
 
 if TYPE_CHECKING:
     from robot_layouts.data.evaluation import Evaluation, Score, evaluate

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import fsum
 from pathlib import Path
 from statistics import mean
-from typing import Any
 
 import torch
 from rich.console import Console
@@ -32,23 +31,23 @@ ENOUGH = 0.9  # share of episodes that must succeed
 FILMED_EPISODES, FILMING_SECONDS = 2, 60.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DemoOptions:
     """What the demo plays and where it leaves its files.
 
     Attributes:
-        task: Task id.
-        seeds: How many seeds to play, from 0.
-        out: Folder for the recording, the picture and the video.
-        video: Whether to make a video.
-        making: Arguments of `tasks.make`: ``layout``, ``robots`` and ``bystanders``.
+        task: Id of the task.
+        seeds: Play seeds 0 to N - 1.
+        out: Folder of the results.
+        no_video: Make no video.
+        cell: The task's robots, and what varies.
     """
 
     task: str = "TwoRobotPickCube-v1"
-    seeds: int = 10
-    out: Path = Path("runs/demo")
-    video: bool = True
-    making: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    seeds: Count = 10
+    out: Folder = Path("runs/demo")
+    no_video: bool = False
+    cell: CellOptions = CellOptions()
 
 
 def run_demo(options: DemoOptions, console: Console) -> bool:
@@ -70,11 +69,12 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
     torch.set_num_threads(1)  # the tensors are small: threads would only wait for each other
     expert = find_expert(options.task)
     cls = tasks.get_task_class(options.task)
-    layout = make_scenario(cls, **options.making).layout
+    making = options.cell.making()
+    layout = make_scenario(cls, **making).layout
     console.print(f"[bold]{options.task}[/], {plural(options.seeds, 'seed')}", highlight=False)
-    film_why_not = _pictures_problem(layout) if options.video else "not asked for"
+    film_why_not = "not asked for" if options.no_video else _pictures_problem(layout)
     _find_files(layout, console)
-    task = tasks.make(options.task, obs_mode="state", **options.making)
+    task = tasks.make(options.task, obs_mode="state", **making)
     _show_layout(layout, options.out, console)
 
     episodes: list[PlayedEpisode] = []
@@ -100,7 +100,8 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
         f"episodes  {escape(str(recording))}, {escape(recorder.json_path.name)}", highlight=False
     )
     if film_why_not is None and episodes:
-        _film(options, episodes, console)
+        filmed = tasks.make(options.task, render_mode="rgb_array", **making)
+        _film(filmed, options.out / "video.mp4", episodes, console)
     elif film_why_not is not None:
         console.print(f"no video: {film_why_not}", highlight=False, soft_wrap=True)
     return sum(score.success for score in scores.values()) >= ENOUGH * len(scores)
@@ -172,9 +173,7 @@ def _report(
     )
 
 
-def _film(options: DemoOptions, episodes: Sequence[PlayedEpisode], console: Console) -> None:
-    path = options.out / "video.mp4"
-    task: TaskEnv = tasks.make(options.task, render_mode="rgb_array", **options.making)
+def _film(task: TaskEnv, path: Path, episodes: Sequence[PlayedEpisode], console: Console) -> None:
     with _live(console) as live:
         line = live.add_task("video")
         shown = film(
@@ -188,27 +187,15 @@ def _film(options: DemoOptions, episodes: Sequence[PlayedEpisode], console: Cons
     console.print(f"video     {escape(str(path))}, {which}", highlight=False)
 
 
-def demo(
-    *,
-    task: str = "TwoRobotPickCube-v1",
-    seeds: Count = 10,
-    out: Folder = Path("runs/demo"),
-    no_video: bool = False,
-    cell: CellOptions,
-) -> int:
+def demo(*, options: DemoOptions) -> int:
     """Let an expert play a task, and keep a recording, a picture and a video.
 
     Exit code: 0 if every seed was solved, 1 if not, 2 for bad usage.
 
     Args:
-        task: Id of the task.
-        seeds: Play seeds 0 to N - 1.
-        out: Folder of the results.
-        no_video: Make no video.
-        cell: The task's robots, and what varies.
+        options: What is played.
 
     Raises:
         RobotLayoutsError: If the task cannot be made, or has no expert.
     """
-    chosen = DemoOptions(task, seeds, out, video=not no_video, making=cell.making())
-    return 0 if run_demo(chosen, Console()) else 1
+    return 0 if run_demo(options, Console()) else 1

@@ -14,10 +14,9 @@ from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.writing import writing_errors
 from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore, scores_of
-from robot_layouts.data.playing.executor import Executor, choose_executor
+from robot_layouts.data.playing.executor import Executor, checked_seeds, choose_executor, seed_lines
 from robot_layouts.data.playing.picture_digests import WatchedPictures
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event
-from robot_layouts.data.playing.seeds import checked_seeds, seed_lines
 from robot_layouts.data.playing.together import Cast, cast_of, grouped
 from robot_layouts.data.receipts.pictures import keep, pictures_folder
 from robot_layouts.data.receipts.provenance import describe_job, receipt_of

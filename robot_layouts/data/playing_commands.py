@@ -223,7 +223,7 @@ def certify(
             cell=recording.cell.making(),
             on_event=show,
         )
-    print(printable(f"{out or certificate_path(path)}: {certificate.task_id}"))
+    print(printable(f"{out or certificate_path(path)}: {certificate.task}"))
     for sentence in sentences(certificate):
         print(printable(sentence))
     return 0 if certificate.holds else 1

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from layouts import Layout
-from layouts.frames import Rectangle
 from layouts.validation.findings import length_text
 from robot_layouts.core.bounds import FAR, checked_number
 from robot_layouts.core.errors import MotionError
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.collision.cell import Cell, cell_of
 from robot_layouts.motion.collision.checker import Checker
-from robot_layouts.motion.collision.continuous import Curve, check_along
+from robot_layouts.motion.collision.continuous import Curve, CurveCheck
 from robot_layouts.motion.model.hermite import hermite_extremes
+from robot_layouts.motion.timed_motion import TimedMotion
 from robot_layouts.motion.timing import velocities
 
 SMALLEST = 1e-6  # m, rad; of steps between moments
@@ -109,35 +107,24 @@ class Certificate:
         return "\n".join([*lines, f"  {used}"])
 
 
-def certify(
-    layout: Layout,
-    times: Floats,
-    positions: Mapping[str, Floats],
-    velocities: Mapping[str, Floats],
-    *,
-    obstacles: Sequence[Any],
-    held: Sequence[Any],
-    table: Rectangle | None,
-    largest_velocities: Mapping[str, Floats],
-    largest_accelerations: Mapping[str, Floats],
-    step: float,
-    turn: float,
-) -> Certificate:
+def certify(motion: TimedMotion, step: float, turn: float) -> Certificate:
     """Check a motion; see `robot_layouts.motion.Motion.certify`."""
     step = checked_number("step", step, SMALLEST, FAR, MotionError, "m")
     turn = checked_number("turn", turn, SMALLEST, FAR, MotionError, "rad")
-    cell = cell_of(layout, obstacles, held, table)
+    cell = cell_of(motion.layout, motion.obstacles, motion.held, motion.table)
     curve = Curve(
-        times,
-        np.concatenate([positions[name] for name in cell.robots], axis=1),
-        np.concatenate([velocities[name] for name in cell.robots], axis=1),
+        motion.times,
+        np.concatenate([motion.positions[name] for name in cell.robots], axis=1),
+        np.concatenate([motion.velocities[name] for name in cell.robots], axis=1),
     )
     moments, places, speeds = hermite_extremes(curve.times, curve.positions, curve.velocities)
     joint_limits = _beyond_limits(cell, curve.positions[0], moments, places)
-    speed, too_fast = _speeds(cell, moments, speeds, _fastest(layout, largest_velocities))
-    acceleration, too_hasty = _accelerations(cell, curve, largest_accelerations)
+    fastest = largest_velocities(motion)
+    limits = np.concatenate([fastest[name] for name in cell.robots])
+    speed, too_fast = _shares(cell, "velocity", moments, np.abs(speeds) / limits)
+    acceleration, too_hasty = _accelerations(cell, curve, motion.largest_accelerations)
     found = Certificate(
-        duration=float(times[-1]),
+        duration=motion.duration,
         moments=0,
         step=step,
         turn=turn,
@@ -151,7 +138,7 @@ def certify(
     if joint_limits or too_fast:
         return found
     checker = cell.checker()
-    seen = check_along(cell, checker, curve, step, turn)
+    seen = CurveCheck(cell, checker, curve, step, turn).run()
     collisions = _collisions(checker, seen.overlaps, curve)
     return replace(
         found,
@@ -180,10 +167,7 @@ def _collisions(checker: Checker, moments: Floats, curve: Curve) -> tuple[Neares
 
 def _clearance(cell: Cell, curve: Curve, moments: Floats) -> Nearest | None:
     """Return the nearest approach of different bodies: at some moments, then around the least."""
-    solids, whole = cell.solids, cell.checker()
-    apart = [solids[a].owner != solids[b].owner for a, b in whole.pairs.tolist()]
-    kept = whole.pairs[np.array(apart, bool)]
-    checker = Checker(cell, kept, np.zeros(len(kept)))
+    checker = cell.between_owners()
     if not len(checker.pairs):
         return None
     looked, distances = moments, checker.distance(curve.at(moments), moments)
@@ -219,17 +203,12 @@ def _beyond_limits(cell: Cell, start: Floats, moments: Floats, places: Floats) -
     ]
 
 
-def _fastest(layout: Layout, given: Mapping[str, Floats]) -> Mapping[str, Floats]:
-    if set(given) == set(layout):
+def largest_velocities(motion: TimedMotion) -> Mapping[str, Floats]:
+    """Return how fast the joints of each robot may move, (dof,) (rad/s, m/s)."""
+    given = motion.largest_velocities
+    if set(given) == set(motion.layout):
         return given
-    return {**velocities.largest_velocities(layout, "pd_joint_pos"), **given}
-
-
-def _speeds(
-    cell: Cell, moments: Floats, speeds: Floats, largest: Mapping[str, Floats]
-) -> tuple[float, list[str]]:
-    limits = np.concatenate([largest[name] for name in cell.robots])
-    return _shares(cell, "velocity", moments, np.abs(speeds) / limits)
+    return {**velocities.largest_velocities(motion.layout, "pd_joint_pos"), **given}
 
 
 def _accelerations(

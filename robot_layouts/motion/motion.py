@@ -1,33 +1,23 @@
-"""Motions: where the joints of all robots of a layout are at every moment."""
+"""Motions of robots, and what can be done with one: certify it, join, draw, save and export it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from layouts import Layout
-from robot_layouts.core.bounds import FAR, checked_number, shown
-from robot_layouts.core.errors import MotionError, UnknownNameError
-from robot_layouts.kinematics.rotations import Floats
-from robot_layouts.motion.model.hermite import hermite, hermite_slopes
-
-if TYPE_CHECKING:
-    from robot_layouts.motion.certificate import Certificate
+from robot_layouts.core.bounds import FAR, checked_number
+from robot_layouts.core.errors import MotionError
+from robot_layouts.motion.certificate import Certificate, certify
+from robot_layouts.motion.timed_motion import TimedMotion
 
 SAME = 1e-6  # rad, m: so far apart is the same place
-STILL: Mapping[str, Floats] = MappingProxyType({})
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Joint positions of all robots of a layout over time.
+class Motion(TimedMotion):
+    """Joint positions of all robots of a layout over time, as `robot_layouts.motion.plan` finds it.
 
     Between the knots the positions follow cubic curves (Hermite's), which have the positions and
     velocities of the knots; before the first knot and after the last everything stands still. All
@@ -52,89 +42,6 @@ class Motion:
             or one beyond a million.
     """
 
-    layout: Layout
-    times: Floats
-    positions: Mapping[str, Floats]
-    velocities: Mapping[str, Floats]
-    obstacles: tuple[Any, ...] = ()
-    held: tuple[Any, ...] = ()
-    table: tuple[float, float, float, float] | None = None
-    clearance: float = 0.0
-    largest_velocities: Mapping[str, Floats] = field(default_factory=lambda: STILL)
-    largest_accelerations: Mapping[str, Floats] = field(default_factory=lambda: STILL)
-
-    def __post_init__(self) -> None:
-        """Freeze the arrays and refuse those that do not fit."""
-        times = _frozen(self.times)
-        _expect_times(times)
-        object.__setattr__(self, "times", times)
-        for what in ("positions", "velocities"):
-            object.__setattr__(self, what, self._by_robot(what, (len(times),)))
-        for what in ("largest_velocities", "largest_accelerations"):
-            object.__setattr__(self, what, self._by_robot(what, (), some=True))
-        object.__setattr__(self, "obstacles", tuple(self.obstacles))
-        object.__setattr__(self, "held", tuple(self.held))
-
-    def __repr__(self) -> str:
-        """Show the robots and how long it takes; the numbers are many."""
-        robots = ", ".join(f"{name}={place.robot.name}" for name, place in self.layout.items())
-        return f"Motion({robots}: {self.duration:.2f} s, {len(self.times)} knots)"
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by the fields; read-only mappings do not pickle by themselves."""
-        fields = dict(self.__dict__)
-        for name, value in fields.items():
-            if isinstance(value, MappingProxyType):
-                fields[name] = dict(value)
-        return (_rebuild, (fields,))
-
-    @property
-    def duration(self) -> float:
-        """How long it takes (s)."""
-        return float(self.times[-1])
-
-    @property
-    def moving(self) -> tuple[str, ...]:
-        """The robots that do not stand still all the time, in the layout's order."""
-        return tuple(
-            name
-            for name, qpos in self.positions.items()
-            if self.velocities[name].any() or (qpos != qpos[0]).any()
-        )
-
-    def sample(self, times: ArrayLike) -> dict[str, Floats]:
-        """Return joint positions by robot at some times (rad, m).
-
-        Args:
-            times: (…) (s); one number gives (dof,), n of them give (n, dof).
-
-        Raises:
-            MotionError: If they are no finite numbers.
-        """
-        times = _moments(times)
-        return {
-            name: hermite(self.times, qpos, self.velocities[name], times)
-            for name, qpos in self.positions.items()
-        }
-
-    def velocity(self, times: ArrayLike) -> dict[str, Floats]:
-        """Return joint velocities by robot at some times, shaped as in `sample` (rad/s, m/s)."""
-        times = _moments(times)
-        return {
-            name: hermite_slopes(self.times, qpos, self.velocities[name], times)
-            for name, qpos in self.positions.items()
-        }
-
-    @property
-    def start(self) -> dict[str, Floats]:
-        """Joint positions at the beginning by robot, (dof,) (rad, m)."""
-        return {name: qpos[0] for name, qpos in self.positions.items()}
-
-    @property
-    def end(self) -> dict[str, Floats]:
-        """Joint positions at the end by robot, (dof,) (rad, m)."""
-        return {name: qpos[-1] for name, qpos in self.positions.items()}
-
     def certify(self, *, step: float = 1e-3, turn: float = np.radians(0.5)) -> Certificate:
         """Check the whole motion again, densely and exactly.
 
@@ -157,21 +64,7 @@ class Motion:
             MissingPackageError: If python-fcl is not installed.
             MotionError: If ``step`` or ``turn`` is invalid, or takes too many moments.
         """
-        from robot_layouts.motion.certificate import certify
-
-        return certify(
-            self.layout,
-            self.times,
-            self.positions,
-            self.velocities,
-            obstacles=self.obstacles,
-            held=self.held,
-            table=self.table,
-            largest_velocities=self.largest_velocities,
-            largest_accelerations=self.largest_accelerations,
-            step=step,
-            turn=turn,
-        )
+        return certify(self, step, turn)
 
     def then(self, other: Motion, rest: float = 0.0) -> Motion:
         """Return this motion and another one after it, with what was said of this one.
@@ -304,63 +197,3 @@ class Motion:
         from robot_layouts.motion.output.files import to_ros2
 
         return to_ros2(self, folder, frequency)
-
-    def _by_robot(self, what: str, rows: tuple[int, ...], *, some: bool = False) -> Any:
-        given = getattr(self, what)
-        if not isinstance(given, Mapping):
-            raise MotionError(f"{what} is a {type(given).__name__}; it takes a mapping by robot")
-        for name in given:
-            if name not in self.layout:
-                raise UnknownNameError("robot of this motion", name, self.layout)
-        missing = [name for name in self.layout if name not in given]
-        if missing and not some:
-            raise MotionError(f"{what} lacks {', '.join(missing)}; all robots have some")
-        arrays = {name: _frozen(given[name]) for name in self.layout if name in given}
-        for name, array in arrays.items():
-            shape = (*rows, self.layout[name].robot.dof)
-            if array.shape != shape:
-                raise MotionError(
-                    f"{what} of {name} has the shape {array.shape}; it must be {shape}"
-                )
-            if some and not (array > 0).all():
-                raise MotionError(f"{what} of {name} are {shown(array.tolist())}; they must be > 0")
-            if not some and not (np.abs(array) <= FAR).all():
-                raise MotionError(
-                    f"{what} of {name} holds {_worst(array)}; they must be finite, {FAR:g} at most"
-                )
-        return MappingProxyType(arrays)
-
-
-def _expect_times(times: Floats) -> None:
-    if times.ndim != 1 or len(times) < 2:
-        raise MotionError(f"times has the shape {times.shape}; it must be (T,), T of 2 or more")
-    if not (times <= FAR).all() or times[0] != 0.0 or (np.diff(times) <= 0).any():
-        raise MotionError(f"times must begin with 0, increase, and be finite, {FAR:g} s at most")
-
-
-def _worst(array: Floats) -> str:
-    """Return the number farthest from 0, or one that is not finite, as text."""
-    return f"{array.flat[np.argmax(np.nan_to_num(np.abs(array), nan=np.inf))]:g}"
-
-
-def _frozen(array: ArrayLike | Sequence[float]) -> Floats:
-    try:
-        own = np.array(array, float)
-    except (TypeError, ValueError) as error:
-        raise MotionError(f"an array of numbers is needed: {error}") from None
-    own.setflags(write=False)
-    return own
-
-
-def _rebuild(fields: dict[str, Any]) -> Motion:
-    return Motion(**fields)
-
-
-def _moments(times: ArrayLike) -> Floats:
-    try:
-        moments = np.asarray(times, float)
-    except (TypeError, ValueError):
-        moments = np.array(np.nan)
-    if not np.isfinite(moments).all():
-        raise MotionError(f"times are {shown(times)}; they must be finite numbers (s)")
-    return moments

@@ -4,37 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 from objects.shapes import Friction
-from robot_layouts.core.bounds import (
-    FAR,
-    checked_flag,
-    checked_number,
-    checked_numbers,
-    checked_whole,
-    shown,
-)
+from robot_layouts.core.bounds import FAR, checked_number, shown
+from robot_layouts.core.schema import check_fields, whole, within
 from robots import SimulationError
-from robots.descriptor import Vector3
 
-# Bounds, both included, and units. Those of the iterations are PhysX's own, which keeps bytes.
-_NUMBERS = {
-    "timestep": (1e-5, 0.1, "s"),
-    "contact_offset": (0.0, 1.0, "m"),
-    "rest_offset": (-1.0, 1.0, "m"),
-    "sleep_threshold": (0.0, FAR, "J/kg"),
-    "bounce_threshold": (1e-6, FAR, "m/s"),
-}
-_COUNTS = {"position_iterations": (1, 255), "velocity_iterations": (0, 255)}
-_FLAGS = (
-    "persistent_contacts",
-    "temporal_gauss_seidel",
-    "continuous_collision",
-    "enhanced_determinism",
-    "friction_every_iteration",
-)
-_GRAVITY = 1e3  # m/s², along each axis
+_FLOATS = "timestep", "contact_offset", "rest_offset", "sleep_threshold", "bounce_threshold"
+_Along = Annotated[float, within(-1e3, 1e3, "m/s²")]
 _ROUNDING = 1e-6  # of a frequency that was written with seven digits
 _LAST_BITS = 1e-12
 _MOST_SUBSTEPS = 10_000  # of one control step: about a second of computing
@@ -63,14 +41,14 @@ class PhysicsSettings:
         friction: Material of shapes that name none.
     """
 
-    timestep: float = 1 / 100
-    gravity: Vector3 = (0.0, 0.0, -9.81)
-    contact_offset: float = 0.02
-    rest_offset: float = 0.0
-    position_iterations: int = 15
-    velocity_iterations: int = 1
-    sleep_threshold: float = 0.005
-    bounce_threshold: float = 2.0
+    timestep: Annotated[float, within(1e-5, 0.1, "s")] = 1 / 100
+    gravity: tuple[_Along, _Along, _Along] = (0.0, 0.0, -9.81)
+    contact_offset: Annotated[float, within(0.0, 1.0, "m")] = 0.02
+    rest_offset: Annotated[float, within(-1.0, 1.0, "m")] = 0.0
+    position_iterations: Annotated[int, whole(1, 255)] = 15  # PhysX keeps bytes
+    velocity_iterations: Annotated[int, whole(0, 255)] = 1
+    sleep_threshold: Annotated[float, within(0.0, FAR, "J/kg")] = 0.005
+    bounce_threshold: Annotated[float, within(1e-6, FAR, "m/s")] = 2.0
     persistent_contacts: bool = True
     temporal_gauss_seidel: bool = True
     continuous_collision: bool = False
@@ -84,27 +62,15 @@ class PhysicsSettings:
         Raises:
             SimulationError: If one has the wrong type or is out of range.
         """
-        for name, (low, high, unit) in _NUMBERS.items():
-            self._set(name, checked_number(*self._named(name), low, high, SimulationError, unit))
-        for name, (least, most) in _COUNTS.items():
-            self._set(name, checked_whole(*self._named(name), least, most, SimulationError))
-        for name in _FLAGS:
-            self._set(name, checked_flag(*self._named(name), SimulationError))
-        gravity = self._named("gravity")
-        self._set("gravity", checked_numbers(*gravity, 3, _GRAVITY, SimulationError, "m/s²"))
-        if not isinstance(self.friction, Friction):
-            raise SimulationError(f"friction is {shown(self.friction)}; a Friction is needed")
+        check_fields(self, SimulationError, "physics")
+        given = vars(self)
+        given.update({name: float(given[name]) for name in _FLOATS})
+        given["gravity"] = tuple(map(float, self.gravity))
         if self.contact_offset <= self.rest_offset:
             raise SimulationError(
                 f"contact_offset is {self.contact_offset} m and rest_offset {self.rest_offset} m;"
                 " contacts must be generated before bodies rest: contact_offset > rest_offset"
             )
-
-    def _named(self, name: str) -> tuple[str, Any]:
-        return f"physics: {name}", getattr(self, name)
-
-    def _set(self, name: str, value: object) -> None:
-        object.__setattr__(self, name, value)
 
 
 # The defaults of SAPIEN 3.0.3 (read from a fresh process).

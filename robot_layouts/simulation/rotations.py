@@ -7,7 +7,6 @@ Their order decides the last bits of observations and rewards, so they stand apa
 from __future__ import annotations
 
 import numpy as np
-import torch
 
 from robot_layouts.simulation.maths import Floats, arctan2, number, sqrt
 
@@ -22,6 +21,9 @@ _FIRST = np.array([4 * i + j for ((i, j), _), _ in _PAIRS])
 _SECOND = np.array([4 * i + j for (_, (i, j)), _ in _PAIRS])
 _SIGN = np.array([sign for _, sign in _PAIRS], np.float32)
 _TWO, _ONE = number(2.0), number(1.0)
+_NOTHING, _LEAST_ROOT = np.float32(0), np.float32(0.1)
+
+Row = tuple[np.float32, ...]
 
 
 def rotation_matrix(quaternion: Floats) -> Floats:
@@ -55,31 +57,34 @@ def last_euler_angle(matrix: Floats) -> Floats:
     return arctan2(-matrix[:, 0, 1], matrix[:, 0, 0])
 
 
-def quaternion(matrix: torch.Tensor) -> torch.Tensor:
-    """Return the quaternion of one rotation matrix, wxyz, float32, (4,), w ≥ 0.
+def upright(quaternion: Row) -> Row:
+    """Return a quaternion with w ≥ 0."""
+    w, x, y, z = quaternion
+    return (-w, -x, -y, -z) if w < _NOTHING else quaternion
+
+
+def quaternion(first: Row, second: Row, third: Row) -> Row:
+    """Return the quaternion, w ≥ 0, of the three rows of a rotation matrix.
 
     Of the four ways to read it off, the one that divides by the largest number.
-
-    Args:
-        matrix: Shape (3, 3), float32.
     """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
-    doubled = torch.stack(
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = first, second, third
+    squares = np.array(
         [
-            1.0 + xx + yy + zz,
-            1.0 + xx - yy - zz,
-            1.0 - xx + yy - zz,
-            1.0 - xx - yy + zz,
+            _ONE + xx + yy + zz,
+            _ONE + xx - yy - zz,
+            _ONE - xx + yy - zz,
+            _ONE - xx - yy + zz,
         ]
     )
-    root = sqrt(doubled.clamp(min=0.0))
-    squared = root**2
-    rows = (
-        (squared[0], zy - yz, xz - zx, yx - xy),
-        (zy - yz, squared[1], yx + xy, xz + zx),
-        (xz - zx, yx + xy, squared[2], zy + yz),
-        (yx - xy, zx + xz, zy + yz, squared[3]),
-    )
-    largest = int(root.argmax())
-    found = torch.stack(rows[largest]) / (2.0 * root[largest].clamp(min=0.1))
-    return -found if found[0] < 0 else found
+    roots = sqrt(np.maximum(squares, _NOTHING))
+    largest = int(roots.argmax())
+    root = roots[largest]
+    found = (
+        (root * root, zy - yz, xz - zx, yx - xy),
+        (zy - yz, root * root, yx + xy, xz + zx),
+        (xz - zx, yx + xy, root * root, zy + yz),
+        (yx - xy, zx + xz, zy + yz, root * root),
+    )[largest]
+    divisor = _TWO * max(root, _LEAST_ROOT)
+    return upright(tuple(number / divisor for number in found))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from robot_layouts.core.bounds import checked_whole
 from robots import SimulationError, TaskError, UnknownNameError, unknown_name_message
-from tasks.arrays import row_of
+from tasks.arrays import nested, row_of
 from tasks.engine.actions import ActionReader
 from tasks.engine.checks import RECONFIGURE, SUCCESS, checked_options, checked_seeds
 from tasks.engine.observation import space_of
@@ -460,15 +460,13 @@ class _Results:
         arrays = self._backend.arrays
         if prefix + OBSERVATION in arrays:
             return arrays[prefix + OBSERVATION][ids].copy()
-        tree: dict[str, Any] = {}
-        for name, array in arrays.items():
-            first, *way = name.split("/")
-            if first == prefix + OBSERVATION:
-                branch = tree
-                for key in way[:-1]:
-                    branch = branch.setdefault(key, {})
-                branch[way[-1]] = array[ids].copy()
-        return tree or np.empty((len(self._everywhere[ids]), 0), np.float32)
+        inside = f"{prefix}{OBSERVATION}/"
+        found = {
+            name.removeprefix(inside): array[ids].copy()
+            for name, array in arrays.items()
+            if name.startswith(inside)
+        }
+        return nested(found) or np.empty((len(self._everywhere[ids]), 0), np.float32)
 
     def info(self, mask: _Flags, ids: _Rows = _ALL, prefix: str = INFO) -> dict[str, Any]:
         """Return the info of some environments, as Gymnasium's own vectors return it.

@@ -62,35 +62,17 @@ def add_goal(world: World, radius: float, name: str = "goal_site") -> None:
     world.add(name, ball, kind="kinematic", marker=True)
 
 
-def add_peg(
-    world: World,
-    name: str,
-    half_length: float,
-    half_width: float,
-    *,
-    tail: Color,
-    head: Color,
-    position: Vector3,
-) -> None:
-    """Add a square peg along its own x axis that physics moves.
+def peg_shapes(
+    half_length: float, half_width: float, *, tail: Color, head: Color
+) -> tuple[Shape, ...]:
+    """Return what a square peg is made of, along its own x axis.
 
     Args:
-        world: The world.
-        name: Its name.
         half_length: Half its length (m).
         half_width: Half its width and height (m).
         tail: Colour of the half at negative x.
         head: Colour of the half at positive x.
-        position: Where it is built (m).
     """
-    shapes = peg_shapes(half_length, half_width, tail=tail, head=head)
-    world.add(name, *shapes, position=position)
-
-
-def peg_shapes(
-    half_length: float, half_width: float, *, tail: Color, head: Color
-) -> tuple[Shape, ...]:
-    """Return what a square peg is made of; see `add_peg`."""
     solid = Box(half_size=(half_length, half_width, half_width), visible=False)
     halves = [
         Box(

@@ -14,6 +14,7 @@ from robot_layouts.simulation import Simulation
 from robot_layouts.simulation.control.modes import ModeController, Remembered
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.readout import ReadoutIndex
+from tasks.arrays import nested as nested
 
 CONTROLLER = "controller"  # native's group of a state dict, and of what a robot observes of itself
 _JOINTS = "target_qpos"
@@ -118,18 +119,6 @@ def by_robot(
         key = robots[entry.robot]
         found[entry.key if key is None else f"{key}/{entry.key}"] = own
     return found
-
-
-def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a mapping by ``a/b/c`` as mappings of mappings."""
-    tree: dict[str, Any] = {}
-    for name, value in flat.items():
-        *above, last = name.split("/")
-        branch = tree
-        for step in above:
-            branch = branch.setdefault(step, {})
-        branch[last] = value
-    return tree
 
 
 def _whole(layout: Layout, robot: str, own: Sequence[Remembered]) -> bool:

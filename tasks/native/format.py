@@ -19,7 +19,7 @@ from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.readout import ReadoutIndex
 from robot_layouts.simulation.world import WorldBody, part_name
 from robots import TaskError, unknown_name_message
-from tasks.arrays import array_of, leaves
+from tasks.arrays import array_of, leaves, nested
 from tasks.native import controllers
 from tasks.native.controllers import CONTROLLER
 
@@ -126,7 +126,7 @@ def read_state_dict(simulation: Simulation, state: State) -> StateDict:
     articulations |= {name: torch.from_numpy(rows) for name, rows in jointed.items()}
     found: StateDict = {"actors": actors, "articulations": articulations}
     if kept := _remembered(simulation):
-        found[CONTROLLER] = controllers.nested({k: torch.from_numpy(x) for k, x in kept.items()})
+        found[CONTROLLER] = nested({k: torch.from_numpy(x) for k, x in kept.items()})
     return found
 
 

@@ -162,9 +162,9 @@ def test_arms_that_touch_are_counted(tmp_path):
         recorder.add(play(env, 0, np.zeros((3, 16), np.float32)))
     found = certify(path, InProcessExecutor())
     assert found.holds
-    assert found.contact_episodes == 1
-    assert found.contact_steps == 3
-    assert found.touching == [{"seed": 0, "success": False, "steps": 3}]
+    assert found.arm_contacts.episodes == 1
+    assert found.arm_contacts.steps == 3
+    assert found.arm_contacts.touching == [{"seed": 0, "success": False, "steps": 3}]
     assert sentences(found)[1].endswith("; seeds 0 (no success)")
-    assert all("left." in pair and "right." in pair for pair in found.pairs)
+    assert all("left." in pair and "right." in pair for pair in found.arm_contacts.pairs)
     assert RecordingCertificate.read(path.with_suffix(".certificate.json")) == found

@@ -47,7 +47,7 @@ def test_the_command_plays_records_and_reports(tmp_path, capsys):
 @pytest.mark.long
 def test_the_demo_may_be_run_again(tmp_path, console):
     for _ in range(2):
-        assert run_demo(DemoOptions(seeds=1, out=tmp_path, video=False), console)
+        assert run_demo(DemoOptions(seeds=1, out=tmp_path, no_video=True), console)
 
 
 def test_too_many_failures_are_told_by_the_exit_code(tmp_path, monkeypatch):
@@ -96,7 +96,7 @@ def test_nine_of_ten_are_enough(tmp_path, monkeypatch, console, solved, enough):
         return replace(play(task, 0, good if seed < solved else bad), seed=seed)
 
     monkeypatch.setattr(demo, "play", play_seed_0)
-    assert run_demo(DemoOptions(out=tmp_path, video=False), console) is enough
+    assert run_demo(DemoOptions(out=tmp_path, no_video=True), console) is enough
     assert f"{solved} of 10 succeeded in {len(good)}.0 steps" in console.export_text()
 
 
@@ -127,7 +127,7 @@ def test_without_matplotlib_one_line_says_so(tmp_path, monkeypatch, console):
     for name in [name for name in sys.modules if name.partition(".")[0] == "matplotlib"]:
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert run_demo(DemoOptions(seeds=1, out=tmp_path, video=False), console)
+    assert run_demo(DemoOptions(seeds=1, out=tmp_path, no_video=True), console)
     assert "no picture of the layout: " in console.export_text()
     assert not (tmp_path / "layout.png").exists()
 

@@ -23,6 +23,7 @@ from robot_layouts.data.export.shots import choose_shots
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.data.recording.recorder import Recorder
+from robot_layouts.simulation.rendering import SIZE
 from robots import RecordingError, RobotRegistry, TaskError
 from robots.descriptor import ActionSplit
 from tasks.episode import play
@@ -242,7 +243,7 @@ class Blind:
         pass
 
     def take(self):
-        return np.zeros((1, *pictures.SHAPE), np.uint8)
+        return np.zeros((1, SIZE, SIZE, 3), np.uint8)
 
 
 def test_pictures_follow_the_recorded_states(recording, monkeypatch):

@@ -14,7 +14,7 @@ import tasks
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.export.lerobot import FileLimits, LeRobotWriter
-from robot_layouts.data.export.statistics import PictureStatistics
+from robot_layouts.data.export.lerobot_files import PictureStatistics
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.video import video_problem

@@ -13,8 +13,8 @@ import pytest
 import robot_layouts.data.playing.ray_executor
 import robot_layouts.data.playing.scheduler
 from robot_layouts.__main__ import main
+from robot_layouts.core.own_packages import PACKAGES
 from robot_layouts.core.processes.start import WorkerError
-from robot_layouts.core.rooms import PACKAGES
 from robot_layouts.data import evaluate
 from robot_layouts.data.playing.ray_cluster import gather_code
 from robot_layouts.data.playing.ray_executor import RayExecutor

@@ -1,4 +1,4 @@
-"""``python -m robot_layouts view``, and ``python -m tasks view --demo``, which hands over to it."""
+"""``robot-layouts view``, and ``robot-layouts tasks view --demo``, which hands over to it."""
 
 import subprocess
 import sys

@@ -20,7 +20,7 @@ from benchmarks.__main__ import PROGRAM as BENCHMARKS
 from parity.__main__ import PROGRAM as PARITY
 from robot_layouts.__main__ import PROGRAM
 from robot_layouts.core.cli import Call
-from robot_layouts.core.rooms import PACKAGES
+from robot_layouts.core.own_packages import PACKAGES
 from tests.docs.blocks import ROOT
 from tests.outside.lab import tomllib
 
@@ -218,7 +218,7 @@ make = "robot-layouts demo"
             ("A=1 robot-layouts record --task X-v1", "required: --episodes, --out"),
             ("robot-layouts portable robot-layouts demo --sedes 1", "Did you mean --seeds"),
             ("python -m robot_layouts demo --sedes 1", "unrecognized arguments: --sedes"),
-            ("python -m tasks lost", "Did you mean 'list'"),
+            ("python -m layouts shwo", "Did you mean 'show'"),
             ("python -m benchmarks placings", "Did you mean 'placing'"),
             ("python -m parity compare --evry", "unrecognized arguments: --evry"),
             ("make benhc", "no target benhc"),

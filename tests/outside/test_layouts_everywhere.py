@@ -19,7 +19,6 @@ from robot_layouts.data.recording.record import record
 from robot_layouts.data.recording.recorder import Recorder
 from robots import ActionError, RobotRegistry, TaskError
 from tasks import Needs
-from tasks.__main__ import main as tasks_main
 from tasks.cell_options import chosen_robots
 from tasks.engine.places import check_needs
 from tasks.episode import play
@@ -125,10 +124,10 @@ class TestFunctions:
         assert not found.success_rate
 
     def test_describe_takes_them(self, cell, capsys):
-        assert tasks_main(["describe", RELAY, "--layout", str(cell)]) == 0
+        assert main(["tasks", "describe", RELAY, "--layout", str(cell)]) == 0
         assert "5 robots" in capsys.readouterr().out
-        assert tasks_main(["describe", PICK, "--robots", "arm=pandda"]) == 2
-        assert tasks_main(["describe", PICK, "--robots", "arm=panda", "panda"]) == 1
+        assert main(["tasks", "describe", PICK, "--robots", "arm=pandda"]) == 2
+        assert main(["tasks", "describe", PICK, "--robots", "arm=panda", "panda"]) == 1
         assert "'panda' should be PLACE=ROBOT" in capsys.readouterr().err
 
     def test_one_robot_needs_no_place(self):

@@ -125,7 +125,7 @@ def test_tasks_tell_it_of_robots_that_approximate(tmp_path):
 
 
 def test_what_counts_as_a_problem():
-    good = TcpTrial("arm", POSE, 0.0, 0.0, 0.05, 0.05, 0.3)
+    good = TcpTrial("arm", POSE, 0.0, 0.05, 0.05, 0.3)
     assert good.problem is None
     assert "misses a corner of a square by 50 mm" in str(good._replace(reported=0.01).problem)
     assert "moves arm by inf mm" in str(good._replace(drift=np.inf).problem)

@@ -1,4 +1,4 @@
-"""``python -m tasks list`` and ``describe``: what they print, and how they fail."""
+"""``robot-layouts tasks list`` and ``describe``: what they print, and how they fail."""
 
 import json
 import subprocess
@@ -9,8 +9,8 @@ import pytest
 
 import tasks
 from layouts import face_to_face, single
+from robot_layouts.__main__ import main
 from robots import TaskError
-from tasks.__main__ import main
 from tasks.description import (
     facts,
     list_table,
@@ -43,7 +43,7 @@ class Silent(Waiting):
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    assert main(arguments) == 0
+    assert main(["tasks", *arguments]) == 0
     printed = capsys.readouterr()
     # The first test that needs a robot's files in a fresh checkout fetches them, and says so.
     said = [line for line in printed.err.splitlines() if not line.startswith("robot files: ")]
@@ -119,7 +119,7 @@ def test_brackets_are_not_markup(capsys):
 
 
 def test_an_unknown_task_takes_one_line(capsys):
-    assert main(["describe", "PikCube-v1"]) == 2
+    assert main(["tasks", "describe", "PikCube-v1"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert printed.err.count("\n") == 1
@@ -130,7 +130,7 @@ def test_other_errors_take_one_line(capsys, monkeypatch, tmp_path):
     broken = tmp_path / "results.json"
     broken.write_text("[]")
     monkeypatch.setattr("tasks.commands.parity_verdicts", lambda: parity_verdicts(broken))
-    assert main(["list"]) == 1
+    assert main(["tasks", "list"]) == 1
     printed = capsys.readouterr()
     assert printed.err.startswith(f"error: {broken} is not a record of comparisons")
     assert (printed.out, printed.err.count("\n")) == ("", 1)
@@ -138,11 +138,11 @@ def test_other_errors_take_one_line(capsys, monkeypatch, tmp_path):
 
 def test_bad_usage(capsys):
     with pytest.raises(SystemExit) as stop:
-        main(["describe"])
+        main(["tasks", "describe"])
     assert stop.value.code == 2
     assert "usage: robot-layouts tasks describe" in capsys.readouterr().err
-    assert main(["prevew"]) == 2
-    assert "Did you mean 'preview'?" in capsys.readouterr().err
+    assert main(["tasks", "prevew"]) == 2
+    assert "Did you mean 'tasks preview'?" in capsys.readouterr().err
 
 
 class TestVerdicts:

@@ -1,4 +1,4 @@
-"""What a page of a task shows, and ``python -m tasks view``."""
+"""What a page of a task shows, and ``robot-layouts tasks view``."""
 
 import numpy as np
 import pytest
@@ -7,11 +7,11 @@ import tasks
 from benchmarks.teleop import served
 from layouts import single
 from layouts.viewer.page import NO_SLIDERS, save_html
+from robot_layouts.__main__ import main
 from robot_layouts.kinematics.rotations import pose_matrix
 from robot_layouts.simulation import Box, Capsule, Cylinder, Sphere
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.world import WorldBody
-from tasks.__main__ import main
 from tasks.view import body_parts, task_cell
 
 TURNED = (0.5, 0.5, -0.5, 0.5)
@@ -71,13 +71,13 @@ def test_a_task_is_served_until_ctrl_c():
 
 def test_a_task_is_saved(tmp_path, capsys):
     path = tmp_path / "task.html"
-    assert main(["view", "PushCube-v1", "--html", str(path)]) == 0
+    assert main(["tasks", "view", "PushCube-v1", "--html", str(path)]) == 0
     assert capsys.readouterr().out == f"page: {path}\n{NO_SLIDERS}\n"
     assert "<title>PushCube-v1, seed 0</title>" in path.read_text()
 
 
 def test_an_unknown_task_is_told(capsys):
-    assert main(["view", "PickCub-v1"]) == 2
+    assert main(["tasks", "view", "PickCub-v1"]) == 2
     assert "Did you mean 'PickCube-v1'?" in capsys.readouterr().err
 
 

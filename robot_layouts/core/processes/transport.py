@@ -13,8 +13,8 @@ from types import FunctionType
 from typing import Any
 
 from robot_layouts.core.errors import RobotLayoutsError
+from robot_layouts.core.own_packages import PACKAGES
 from robot_layouts.core.processes.start import WorkerError
-from robot_layouts.core.rooms import PACKAGES
 
 _CHECKOUT = Path(__file__).parents[3]
 _ALONE = "use this process alone: workers=0, and num_workers=0 of a vector"

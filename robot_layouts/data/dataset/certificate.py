@@ -8,7 +8,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,16 +19,14 @@ from robot_layouts.core.pages import plural
 from robot_layouts.core.schema import FieldError, Name, Object, check, exactly, length, whole
 from robot_layouts.core.writing import write_whole
 from robot_layouts.data.playing.environment import versions as installed
-from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.executor import Executor, checked_seeds, play_all
 from robot_layouts.data.playing.replay import (
     RecordedJob,
-    RecordedPlay,
     Replayed,
     open_recording,
     replay,
 )
 from robot_layouts.data.playing.scheduler import Event
-from robot_layouts.data.playing.seeds import checked_seeds
 from robot_layouts.data.reading.json_files import (
     MAX_JSON,
     MAX_SEED,
@@ -37,9 +35,10 @@ from robot_layouts.data.reading.json_files import (
     sized_file,
     spans_of,
 )
-from robot_layouts.data.reading.recording import Recording, all_files, first_file
+from robot_layouts.data.reading.recording import Recording, Trajectory, all_files, first_file
 from robot_layouts.experts.touching import ArmWatch
 from robots import RecordingError, UnreadableFileError
+from tasks import TaskEnv
 
 FORMAT = "robot-layouts certificate 1"
 FILE = "certificate.json"
@@ -90,40 +89,51 @@ class CheckedEpisode:
 
 
 @dataclass
+class TouchingArms:
+    """The episodes of a recording in which arms touched each other.
+
+    Attributes:
+        episodes: How many there are.
+        steps: Control steps in which they did.
+        pairs: The same by pair of links.
+        touching: Seed, success and number of such steps of these episodes, the first hundred.
+    """
+
+    episodes: int = 0
+    steps: int = 0
+    pairs: dict[str, int] = field(default_factory=dict[str, int])
+    touching: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+
+
+@dataclass
 class RecordingCertificate:
     """What was found when a recording was played again; it does not depend on who played.
 
     Attributes:
-        task_id: Id of the task.
+        task: Id of the task.
+        versions: Of what played them.
         files: Name, size and SHA-256 of each h5 file and json.
         episodes: How many episodes these hold.
-        versions: Of what played them.
         checked: Seeds of the episodes that were played.
         equal: How many of these were the same to the last bit.
         steps: Their control steps.
         successes: How many ended in success.
         differing: Seed, step and array of those that were not the same, the first hundred.
         not_played: Seed and reason of those that could not be played, likewise.
-        contact_episodes: Episodes in which arms touched each other.
-        contact_steps: Control steps in which they did.
-        pairs: The same by pair of links.
-        touching: Seed, success and number of such steps of these episodes, likewise.
+        arm_contacts: Those in which arms touched each other.
     """
 
-    task_id: str
+    task: str
+    versions: dict[str, str]
     files: list[dict[str, Any]]
     episodes: int
-    versions: dict[str, str] = field(default_factory=lambda: versions())
     checked: set[int] = field(default_factory=set[int])
     equal: int = 0
     steps: int = 0
     successes: int = 0
     differing: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     not_played: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
-    contact_episodes: int = 0
-    contact_steps: int = 0
-    pairs: Counter[str] = field(default_factory=Counter[str])
-    touching: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    arm_contacts: TouchingArms = field(default_factory=TouchingArms)
 
     @property
     def complete(self) -> bool:
@@ -146,11 +156,12 @@ class RecordingCertificate:
         else:
             _keep(self.differing, {"seed": seed, "step": differs.step, "array": differs.array})
         if checked.touching:
-            self.contact_episodes += 1
-            self.contact_steps += checked.touching_steps
-            self.pairs.update(checked.touching)
-            about = {"success": replayed.success, "steps": checked.touching_steps}
-            _keep(self.touching, {"seed": seed, **about})
+            arms, steps = self.arm_contacts, checked.touching_steps
+            arms.episodes += 1
+            arms.steps += steps
+            for pair, touched in checked.touching.items():
+                arms.pairs[pair] = arms.pairs.get(pair, 0) + touched
+            _keep(arms.touching, {"seed": seed, "success": replayed.success, "steps": steps})
 
     def note_failure(self, seed: int, reason: str) -> None:
         """Count an episode that could not be played."""
@@ -159,26 +170,14 @@ class RecordingCertificate:
 
     def to_json(self) -> dict[str, Any]:
         """Return it as plain data."""
+        arms = self.arm_contacts
         return {
             "format": FORMAT,
             "complete": self.complete,
             "holds": self.holds,
-            "task": self.task_id,
-            "versions": self.versions,
-            "files": self.files,
-            "episodes": self.episodes,
+            **vars(self),
             "checked": spans_of(sorted(self.checked)),
-            "equal": self.equal,
-            "steps": self.steps,
-            "successes": self.successes,
-            "differing": self.differing,
-            "not_played": self.not_played,
-            "arm_contacts": {
-                "episodes": self.contact_episodes,
-                "steps": self.contact_steps,
-                "pairs": dict(sorted(self.pairs.items())),
-                "touching": self.touching,
-            },
+            "arm_contacts": {**vars(arms), "pairs": dict(sorted(arms.pairs.items()))},
         }
 
     def write(self, path: Path) -> None:
@@ -197,15 +196,18 @@ class RecordingCertificate:
             RecordingError: If it cannot be read, or is no certificate.
         """
         try:
-            found = read_json(path, MAX_JSON)
-            check(found, _Certificate, "")
+            found = check(read_json(path, MAX_JSON), _Certificate, "")
         except UnreadableFileError as error:
             raise RecordingError(str(error)) from error
         except FieldError as error:
             raise RecordingError(f"{path} is no certificate: {error}") from error
         if sum(last - first + 1 for first, last in found["checked"]) > found["episodes"]:
             raise RecordingError(f"{path} is no certificate: it checked more than there is")
-        return _from_json(found)
+        spans = found["checked"]
+        found["checked"] = {seed for first, last in spans for seed in range(first, last + 1)}
+        found["arm_contacts"] = TouchingArms(**found["arm_contacts"])
+        own = fields(RecordingCertificate)
+        return RecordingCertificate(**{one.name: found[one.name] for one in own})
 
 
 def versions() -> dict[str, str]:
@@ -216,12 +218,13 @@ def versions() -> dict[str, str]:
 
 def sentences(certificate: RecordingCertificate) -> Sequence[str]:
     """Return a certificate as sentences."""
-    c = certificate
+    c, arms = certificate, certificate.arm_contacts
     lines = [
         f"{c.equal} of {c.episodes} episodes equal to the last bit, {c.steps} steps, {c.successes}"
         " successes",
-        f"arms touched in {plural(c.contact_episodes, 'episode')}"
-        + (f", {plural(c.contact_steps, 'step')}: {', '.join(c.pairs)}{_seeds(c)}" * bool(c.pairs)),
+        f"arms touched in {plural(arms.episodes, 'episode')}"
+        + f", {plural(arms.steps, 'step')}: {', '.join(arms.pairs)}{_seeds(arms)}"
+        * bool(arms.pairs),
     ]
     if c.differing:
         first = c.differing[0]
@@ -236,12 +239,12 @@ def sentences(certificate: RecordingCertificate) -> Sequence[str]:
     return lines
 
 
-def _seeds(certificate: RecordingCertificate) -> str:
+def _seeds(arms: TouchingArms) -> str:
     """Return the first three episodes in which arms touched, as the end of a sentence."""
-    named = [
-        f"{one['seed']}{'' if one['success'] else ' (no success)'}" for one in certificate.touching
-    ][:3]
-    more = "" if certificate.contact_episodes <= len(named) else " and others"
+    named = [f"{one['seed']}{'' if one['success'] else ' (no success)'}" for one in arms.touching][
+        :3
+    ]
+    more = "" if arms.episodes <= len(named) else " and others"
     return f"; seeds {', '.join(named)}{more}" if named else ""
 
 
@@ -252,20 +255,6 @@ def _keep(listed: list[dict[str, Any]], entry: dict[str, Any]) -> None:
     del listed[SHOWN:]
 
 
-def _from_json(found: Mapping[str, Any]) -> RecordingCertificate:
-    contacts = found["arm_contacts"]
-    as_they_are = ("files", "episodes", "versions", "equal", "steps", "successes")
-    return RecordingCertificate(
-        task_id=found["task"],
-        **{name: found[name] for name in (*as_they_are, "differing", "not_played")},
-        checked={seed for first, last in found["checked"] for seed in range(first, last + 1)},
-        contact_episodes=contacts["episodes"],
-        contact_steps=contacts["steps"],
-        pairs=Counter(contacts["pairs"]),
-        touching=contacts.get("touching", []),
-    )
-
-
 OnEvent = Callable[[RecordingCertificate, Event | None], None]
 
 
@@ -273,36 +262,31 @@ OnEvent = Callable[[RecordingCertificate, Event | None], None]
 class CertifyJob(RecordedJob):
     """Episodes that are played again and certified."""
 
-    def __call__(self) -> Callable[[int], CheckedEpisode]:
-        """Open the recording and make its task in a worker.
+    def tools(self, task: TaskEnv) -> ArmWatch:
+        """Return what sees which arms touch.
 
         Raises:
-            MissingPackageError: If it takes python-fcl to see which arms touch.
-            TrajectoryError: If that is impossible here.
+            MissingPackageError: If it takes python-fcl to see it.
         """
-        return _Certifier(self)
+        return ArmWatch(task)
 
+    def play(self, task: TaskEnv, episode: Trajectory, tools: ArmWatch) -> CheckedEpisode:
+        """Play an episode again.
 
-class _Certifier(RecordedPlay[CertifyJob]):
-    """Plays the episodes of seeds again."""
-
-    def __init__(self, job: CertifyJob) -> None:
-        super().__init__(job)
-        self._arms = ArmWatch(self._task)
-
-    def __call__(self, seed: int) -> CheckedEpisode:
-        trajectory = self.recorded(seed)
-        if not trajectory.rebuilt or trajectory.states is None:
+        Raises:
+            TrajectoryError: If it cannot be played exactly.
+        """
+        if not episode.rebuilt or episode.states is None:
             raise TrajectoryError(
-                f"episode {trajectory.episode_id} cannot be played exactly: it needs the seed of"
+                f"episode {episode.episode_id} cannot be played exactly: it needs the seed of"
                 " its reset, which must have built the world anew, and states to compare with"
             )
         pairs: list[set[str]] = []
 
         def watch() -> None:
-            pairs.append({", ".join(sorted(map(str, pair))) for pair in self._arms.touching()})
+            pairs.append({", ".join(sorted(map(str, pair))) for pair in tools.touching()})
 
-        replayed = replay(self._task, trajectory, everything=True, watch=watch)
+        replayed = replay(task, episode, everything=True, watch=watch)
         steps = pairs[1:]  # the first is that after the reset
         touching = Counter(pair for touched in steps for pair in touched)
         return CheckedEpisode(replayed, dict(touching), sum(map(bool, steps)))
@@ -343,7 +327,7 @@ def certify(
         places = {seed: place for place, seed in enumerate(seeds)}
         job = CertifyJob(**RecordedJob.about(file, places, cell))
         certificate = _begun(
-            out, RecordingCertificate(file.task_id, _files(path, file), len(seeds))
+            out, RecordingCertificate(file.task_id, versions(), _files(path, file), len(seeds))
         )
     on_event(certificate, None)
     missing, written = [s for s in seeds if s not in certificate.checked], time.monotonic()
@@ -404,5 +388,5 @@ def _begun(out: Path, fresh: RecordingCertificate) -> RecordingCertificate:
     if not out.exists():
         return fresh
     there = RecordingCertificate.read(out)
-    same = all(getattr(there, n) == getattr(fresh, n) for n in ("task_id", "files", "versions"))
+    same = all(getattr(there, n) == getattr(fresh, n) for n in ("task", "files", "versions"))
     return there if same and not there.complete else fresh

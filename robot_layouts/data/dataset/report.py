@@ -188,9 +188,9 @@ def _tiles(report: DatasetReport) -> list[Tile]:
         kind = "good" if c.holds else "bad"
         equal = f"{c.equal:,} of {c.episodes:,}"
         tiles.append(Tile("equal to the last bit", equal, "replayed", kind))
-        touched = f"{c.contact_episodes:,}"
+        touched = f"{c.arm_contacts.episodes:,}"
         note = "in every step of physics"
-        kind = "bad" if c.contact_episodes else "good"
+        kind = "bad" if c.arm_contacts.episodes else "good"
         tiles.append(Tile("episodes in which arms touch", touched, note, kind))
     if report.clearances is not None:
         least = float(report.clearances.least.min())
@@ -238,17 +238,17 @@ def _clearances(report: DatasetReport) -> dict[str, str] | None:
 def _certificate_rows(certificate: RecordingCertificate | None) -> list[tuple[str, str]]:
     if certificate is None:
         return []
-    c = certificate
+    c, arms = certificate, certificate.arm_contacts
     versions = ", ".join(f"{name} {version}" for name, version in c.versions.items())
     rows = [
         ("episodes played again", f"{len(c.checked):,} of {c.episodes:,}"),
         ("equal to the last bit", f"{c.equal:,}"),
         ("control steps", f"{c.steps:,}"),
-        ("episodes in which arms touch", f"{c.contact_episodes:,}"),
-        ("steps in which arms touch", f"{c.contact_steps:,}"),
+        ("episodes in which arms touch", f"{arms.episodes:,}"),
+        ("steps in which arms touch", f"{arms.steps:,}"),
         ("played on", versions),
     ]
-    rows += [("touched", f"{pair}: {count:,} steps") for pair, count in sorted(c.pairs.items())]
+    rows += [("touched", f"{pair}: {count:,} steps") for pair, count in sorted(arms.pairs.items())]
     for entry in c.differing[:10]:
         rows.append(("differs", f"seed {entry['seed']}, step {entry['step']}, {entry['array']}"))
     for entry in c.not_played[:10]:

@@ -7,7 +7,7 @@ import re
 import shutil
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
@@ -36,7 +36,7 @@ from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.data.recording.disk import claim
 from robots import MissingPackageError, RecordingError, TaskError, UnknownNameError
 from tasks.description import instruction_of
-from tasks.engine.cameras import Size, checked_size
+from tasks.engine.cameras import checked_size
 from tasks.engine.columns import OVERVIEW
 
 if TYPE_CHECKING:
@@ -113,55 +113,62 @@ def _remove_abandoned(path: Path) -> None:
                 os.close(lock)
 
 
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions:
+    """What a dataset holds, of those of its options that are words on a command line, too.
+
+    Attributes:
+        fps: Steps per second to state (default: the task's, 20; lerobot).
+        video: Draw every step as well, as videos (lerobot; needs Vulkan): what the overview sees,
+            unless cameras are named.
+        images: Write png images, which lose nothing, in place of videos (lerobot).
+        depth: Write the cameras' depth as well (mm, 16 bits; for lerobot always as png images).
+        size: Width and height of the pictures in pixels (each camera's own).
+        points: Write N points of what the recording's cameras observed (robomimic).
+        points_frame: Measure them, and their box, from the base of this robot (the world).
+        include_failures: Export episodes whose last step is no success, too.
+        task: The recording's task; MODULE:ID for one of your own.
+    """
+
+    fps: int | None = None
+    video: bool = False
+    images: bool = False
+    depth: bool = False
+    size: PictureSize | None = None
+    points: Count | None = None
+    points_frame: Annotated[str, Word("PLACE")] | None = None
+    include_failures: bool = False
+    task: str | None = None
+
+
 @dataclass(frozen=True)
-class Export:
+class Export(ExportOptions):
     """What is exported, and as what.
 
     Attributes:
         recording: An h5 file, ours or native's, with its json beside it, or a recording's folder.
         format: ``"lerobot"`` or ``"robomimic"``.
         out: Folder of the dataset; it must be new or empty.
-        fps: Control steps per second that the dataset states (``"lerobot"`` only); those of the
-            task if None.
-        video: Whether pictures are drawn and written as videos (``"lerobot"`` only); those of the
-            overview unless ``cameras`` says more.
-        include_failures: Whether episodes whose last step is no success are exported, too.
-        task: The recording's task; ``module:Id`` for one of a module that no package lists.
         layout: Where its robots stood, where the recording cannot say it.
         robots: Which robots these were, where the recording cannot say it.
         cameras: Which cameras' pictures are drawn: names by place such as ``"base_camera"`` and
             ``"left.hand_camera"``, ``"overview"``, or ``"all"`` for those of the task and its
             robots. Videos in a LeRobot dataset, arrays in a robomimic one.
-        images: Whether a LeRobot dataset holds png images, which lose nothing, in place of videos.
-        depth: Whether the cameras of the task and its robots tell of depth, too (mm, 16 bits); in
-            a LeRobot dataset always as png images.
-        size: Width and height of their pictures (pixels); None: each camera's own.
         instruction: What is to be done, in a sentence: of all episodes, or by ``episode_id``. Those
             without have their source's (``"instruction"`` in `Trajectory.source`), else their
             task's.
-        points: How many points of what the recording's cameras observed (``"robomimic"`` only);
-            see `robot_layouts.data.point_clouds.point_cloud`.
-        points_box: Which of them: the lowest and the highest corner of a box (m); None: all.
-        points_frame: The place of the robot from whose base they are measured; None: the world.
+        points_box: Which points: the lowest and the highest corner of a box (m); None: all. See
+            `robot_layouts.data.point_clouds.point_cloud`.
     """
 
     recording: str | PathLike[str]
     format: str
     out: str | PathLike[str]
-    fps: int | None = None
-    video: bool = False
-    include_failures: bool = False
-    task: str | None = None
-    layout: Layout | None = None
-    robots: Mapping[str, RobotLike] | None = None
-    cameras: str | Sequence[str] | None = None
-    images: bool = False
-    depth: bool = False
-    size: Size | None = None
-    instruction: str | Mapping[int, str] | None = None
-    points: int | None = None
-    points_box: Box | None = None
-    points_frame: str | None = None
+    layout: Layout | None = field(default=None, kw_only=True)
+    robots: Mapping[str, RobotLike] | None = field(default=None, kw_only=True)
+    cameras: str | Sequence[str] | None = field(default=None, kw_only=True)
+    instruction: str | Mapping[int, str] | None = field(default=None, kw_only=True)
+    points_box: Box | None = field(default=None, kw_only=True)
 
     @property
     def camera_names(self) -> tuple[str, ...]:
@@ -413,10 +420,12 @@ class _Work:
             yield lambda columns: Drawing(task, columns, shots, last=last)
             return
         from robot_layouts.data.export.drawing import DrawingJob, draw_in_order
+        from robot_layouts.data.playing.replay import RecordedJob
 
-        path = Path(wanted.recording).absolute()
-        job = DrawingJob(path, task.task_class, shots, last, wanted.layout, wanted.robots)
         numbers = [i for i in range(len(file)) if wanted.include_failures or succeeded(file[i])]
+        making = {"layout": wanted.layout, "robots": wanted.robots, "pictures": True}
+        about = RecordedJob.about(file, {i: i for i in numbers}, making)
+        job = DrawingJob(**about, shots=shots, last=last)
         episodes = draw_in_order(
             job, executor, numbers, folder, lambda n: progress(n, len(file)), tell
         )
@@ -464,19 +473,11 @@ def export_command(
     *,
     format: Annotated[str, Word("FORMAT")],
     out: Folder,
-    fps: int | None = None,
-    video: bool = False,
     cameras: Sequence[Annotated[str, Word("NAME")]] | None = None,
-    images: bool = False,
-    depth: bool = False,
-    size: PictureSize | None = None,
     instruction: Annotated[str, Word("TEXT")] | None = None,
-    points: Count | None = None,
     points_box: BoxCorners | None = None,
-    points_frame: Annotated[str, Word("PLACE")] | None = None,
-    include_failures: bool = False,
     only_successes: bool = False,
-    task: str | None = None,
+    options: ExportOptions,
     players: Players,
 ) -> None:
     """Write a recording as a dataset for LeRobot or robomimic.
@@ -488,43 +489,27 @@ def export_command(
         recording: An h5 file, or a recording's folder.
         format: Format of the dataset: lerobot or robomimic.
         out: New folder for the dataset.
-        fps: Steps per second to state (default: the task's, 20).
-        video: Draw every step as well (lerobot; needs Vulkan).
         cameras: Draw what these cameras see, as videos (lerobot) or arrays (robomimic): all,
             overview, or by place: base_camera, left.hand_camera.
-        images: Write png images, which lose nothing, in place of videos.
-        depth: Write the cameras' depth as well (mm, 16 bits).
-        size: Width and height of the pictures in pixels (each camera's own).
         instruction: What the policy is to do, in words (the task's own).
-        points: Write N points of what the recording's cameras observed (robomimic).
-        points_box: Only those in a box: its lowest and its highest corner (m).
-        points_frame: Measure them, and the box, from the base of this robot (the world).
-        include_failures: Export episodes without success, too.
+        points_box: Only points in a box: its lowest and its highest corner (m).
         only_successes: What happens anyway.
-        task: The recording's task; MODULE:ID for one of your own.
+        options: What the dataset holds.
         players: Who plays.
 
     Raises:
         RobotLayoutsError: If the export fails; see `export`.
     """
-    if include_failures and only_successes:
+    if options.include_failures and only_successes:
         raise UsageError("--include-failures and --only-successes contradict each other")
     wanted = Export(
         recording,
         format,
         out,
-        fps=fps,
-        video=video,
-        include_failures=include_failures,
-        task=task,
         cameras=cameras,
-        images=images,
-        depth=depth,
-        size=size,
         instruction=instruction,
-        points=points,
         points_box=None if points_box is None else (points_box[:3], points_box[3:]),
-        points_frame=points_frame,
+        **vars(options),
     )
     in_process = players.workers == 0 and players.ray is None
     executor = None if in_process else players.executor()

@@ -9,26 +9,21 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-import torch
 
-from layouts import Layout
-from layouts.placement import RobotLike
 from robot_layouts.core.processes.worker import report
 from robot_layouts.data.export.columns import ColumnReader, Columns, state_row
 from robot_layouts.data.export.shots import RGB, Frame, Picture, PictureChannel, Shots
-from robot_layouts.data.playing.executor import Executor, modules_of, play_all
+from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.replay import RecordedJob
 from robot_layouts.data.reading.json_files import TrajectoryError
-from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.reading.recording import Trajectory
 from robot_layouts.data.video import INSTALL
 from robot_layouts.simulation import Simulation
-from robot_layouts.simulation.rendering import SIZE, Cameras, Observers, vulkan_problem
+from robot_layouts.simulation.rendering import Cameras, Observers, vulkan_problem
 from robots import MissingPackageError, SimulationError
-from tasks import MultiRobotTask, TaskEnv
+from tasks import TaskEnv
 from tasks.engine.columns import OVERVIEW
 from tasks.episode import States, moments, open_loop
-
-SHAPE = (SIZE, SIZE, 3)  # of the overview
 
 
 def require_pictures(*, video: bool, images: bool, driver: bool, without: str) -> None:
@@ -164,66 +159,33 @@ class DrawnEpisode:
 
 
 @dataclass(frozen=True)
-class DrawingJob:
-    """Makes what draws the episodes of a recording, which are numbered as in the file.
+class DrawingJob(RecordedJob):
+    """Episodes of a recording that are drawn, each in a world that is built anew.
 
     Attributes:
-        recording: The h5 file or the recording's folder, where workers can read it.
-        task: Class of the task that was recorded; loading it imports its module.
         shots: What is drawn of every moment.
         last: Whether the state after the last step is drawn as well.
-        layout: Where its robots stood, where the recording cannot say it.
-        robots: Which robots these were, where the recording cannot say it.
     """
 
-    recording: Path
-    task: type[MultiRobotTask]
     shots: Shots
     last: bool
-    layout: Layout | None = None
-    robots: Mapping[str, RobotLike] | None = None
 
-    @property
-    def modules(self) -> tuple[str, ...]:
-        """The modules that a worker on another machine may need."""
-        return modules_of(self.task)
+    def tools(self, task: TaskEnv) -> ColumnReader:
+        """Return what reads the episodes' columns."""
+        return ColumnReader(task)
 
-    def __call__(self) -> Callable[[int], DrawnEpisode]:
-        """Make the task in a worker, and return what draws an episode by its number.
-
-        Raises:
-            RobotLayoutsError: If it cannot be made there, or the recording cannot be read.
-        """
-        torch.set_num_threads(1)  # the tensors are small, and other workers want the cores
-        return _Drawer(self)
-
-
-class _Drawer:
-    """Draws episodes in one world, which is built anew for each."""
-
-    def __init__(self, job: DrawingJob) -> None:
-        self._job, self._file = job, Recording(job.recording)
-        self._task = task_for(self._file, layout=job.layout, robots=job.robots, pictures=True)
-        self._reader = ColumnReader(self._task)
-
-    def __call__(self, number: int) -> DrawnEpisode:
+    def play(self, task: TaskEnv, episode: Trajectory, tools: ColumnReader) -> DrawnEpisode:
         """Draw an episode."""
-        job, columns = self._job, self._reader.read(self._file[number])
-        drawing = Drawing(self._task, columns, job.shots, last=job.last)
+        drawing = Drawing(task, tools.read(episode), self.shots, last=self.last)
         pictures = {
             channel: np.empty((len(drawing), *channel.shape), channel.dtype)
-            for channel in job.shots.channels
+            for channel in self.shots.channels
         }
         for moment, frame in enumerate(drawing):
             for channel, picture in frame.items():
                 pictures[channel][moment] = picture
             report((moment + 1) / len(drawing))
         return DrawnEpisode(pictures, drawing.exact)
-
-    def close(self) -> None:
-        """Let the worlds and the file go."""
-        self._task.close()
-        self._file.close()
 
 
 def draw_in_order(

@@ -20,9 +20,10 @@ from robot_layouts.data.export.lerobot_files import (
     FileLimits,
     ParquetFiles,
     PictureWriter,
+    describe_numbers,
+    flatten,
 )
 from robot_layouts.data.export.shots import Frame, PictureChannel
-from robot_layouts.data.export.statistics import describe_numbers, flatten
 from robot_layouts.data.export.writer import DatasetWriter
 from tasks.engine.columns import lerobot_columns
 

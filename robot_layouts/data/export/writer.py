@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
-
-from typing_extensions import Self
 
 from robot_layouts.data.export.columns import ColumnReader, Columns
 from robot_layouts.data.export.shots import Frame
 
 
-class DatasetWriter(ABC):
+class DatasetWriter(AbstractContextManager["DatasetWriter", None]):
     """Writes episodes one after the other; the dataset is complete when the block ends."""
 
     def __init__(self, folder: Path, reader: ColumnReader, origin: Mapping[str, Any]) -> None:
@@ -28,16 +25,7 @@ class DatasetWriter(ABC):
         """
         self._folder, self._reader, self._origin = folder, reader, origin
 
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         """Complete the dataset, unless there was an error, and let go of its files."""
         if error is not None:
             with suppress(OSError):  # of files that are incomplete anyway: the first error counts

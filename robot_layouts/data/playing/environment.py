@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import torch
 
+from robot_layouts.core.own_packages import PLAYING
 from robot_layouts.core.portable import is_portable
-from robot_layouts.core.rooms import PLAYING
 
 # What computes states, and what experts plan with.
 PACKAGES = (

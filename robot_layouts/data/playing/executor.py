@@ -1,9 +1,11 @@
-"""Who plays whole episodes: worker processes that may die, or this process."""
+"""Who plays whole episodes, and which: worker processes that may die, or this process."""
 
 from __future__ import annotations
 
+import operator
 import os
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from typing import Any, Protocol
 
@@ -23,6 +25,8 @@ from robot_layouts.data.playing.scheduler import (
 from robots import TaskError
 
 _PATIENCE = 10.0  # s that a worker may take to end by itself
+_END = 2**32  # of seeds, as in native
+_SHOWN = 10  # seeds that a text names
 
 
 class Executor(Protocol):
@@ -173,3 +177,37 @@ def modules_of(*things: Any) -> tuple[str, ...]:
     """Return the modules that define classes, functions, or the classes of other things."""
     known = (thing if hasattr(thing, "__module__") else type(thing) for thing in things)
     return tuple(dict.fromkeys(str(thing.__module__) for thing in known))
+
+
+def checked_seeds(seeds: Iterable[int]) -> list[int]:
+    """Return seeds as plain integers.
+
+    Raises:
+        TaskError: If they are not seeds, or one is there twice.
+    """
+    try:
+        checked = [operator.index(seed) for seed in seeds]
+    except TypeError:
+        raise TaskError(f"seeds is {seeds!r}; it takes a sequence of integers") from None
+    outside = [seed for seed in checked if not 0 <= seed < _END]
+    if outside:
+        raise TaskError(f"seed {outside[0]} must lie from 0 to 2**32 - 1")
+    twice = [seed for seed, count in Counter(checked).items() if count > 1]
+    if twice:
+        raise TaskError(f"seed {twice[0]} is there twice; each episode is played once")
+    return checked
+
+
+def seed_lines(what: str, reasons: Mapping[int, str]) -> list[str]:
+    """Return lines that name seeds, and say why, one line for each seed of which that is known.
+
+    Args:
+        what: What is to be said of them, such as ``"no success"``.
+        reasons: Seed → why, in words; empty if that is unknown.
+    """
+    if not reasons:
+        return []
+    more = f" and {len(reasons) - _SHOWN} more" if len(reasons) > _SHOWN else ""
+    named = f"seed{'s' * (len(reasons) > 1)} {', '.join(map(str, [*reasons][:_SHOWN]))}{more}"
+    known = [f"seed {seed}: {reason}" for seed, reason in reasons.items() if reason]
+    return [f"{what}: {named}", *known[:_SHOWN]]

@@ -20,10 +20,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
+from robot_layouts.core.own_packages import PACKAGES
 from robot_layouts.core.portable import inherited_variables
 from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import is_installed
-from robot_layouts.core.rooms import PACKAGES
 from robots import MissingPackageError, TaskError, UnknownNameError
 from robots.assets.manifest import load_manifest
 

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 import torch
@@ -277,12 +277,13 @@ def _refusal(trajectory: Trajectory, why: str) -> TrajectoryError:
 
 @dataclass(frozen=True)
 class RecordedJob:
-    """What workers need to play episodes of a recording; can be pickled.
+    """Episodes of a recording that workers play; can be pickled.
 
     Attributes:
         path: The recording; workers read it at the same place.
         places: Place of each episode in the recording, by the seed that workers are given.
-        cell: Where robots stood and which, where the file cannot say it; see `task_for`.
+        cell: Where robots stood and which, where the file cannot say it, and what is observed: the
+            arguments of `task_for`.
         task: Class of the task, which other machines may need.
     """
 
@@ -304,35 +305,47 @@ class RecordedJob:
         """What other machines may need to play it."""
         return modules_of(self.task)
 
+    def __call__(self) -> RecordedPlay:
+        """Open the recording and make its task in a worker.
 
-AnyRecordedJob = TypeVar("AnyRecordedJob", bound=RecordedJob)
+        Raises:
+            RobotLayoutsError: If that is impossible there.
+        """
+        return RecordedPlay(self)
+
+    def tools(self, task: TaskEnv) -> Any:
+        """Return what else a worker needs to play any of them; it is closed if it can be."""
+        return None
+
+    def play(self, task: TaskEnv, episode: Trajectory, tools: Any) -> Any:
+        """Return the result of an episode."""
+        raise NotImplementedError
 
 
-class RecordedPlay(Generic[AnyRecordedJob]):
-    """Plays the episodes of a recording in a worker."""
+class RecordedPlay:
+    """Plays the episodes of a job in a worker."""
 
-    def __init__(self, job: AnyRecordedJob, **observing: Any) -> None:
+    def __init__(self, job: RecordedJob) -> None:
         """Open the recording, and make its task.
-
-        Args:
-            job: Which recording.
-            observing: What the task observes; see `task_for`.
 
         Raises:
             TrajectoryError: If that is impossible here.
         """
         torch.set_num_threads(1)  # sums are the same everywhere, and other workers want the cores
         self._job, self._file = job, Recording(job.path)
-        self._task = task_for(self._file, **job.cell, **observing)
+        self._task = task_for(self._file, **job.cell)
+        self._tools = job.tools(self._task)
 
-    def recorded(self, seed: int) -> Trajectory:
-        """Return the episode of a seed as it was recorded."""
-        return self._file[self._job.places[seed]]
+    def __call__(self, seed: int) -> Any:
+        """Return the result of the episode of a seed."""
+        job = self._job
+        return job.play(self._task, self._file[job.places[seed]], self._tools)
 
     def close(self) -> None:
         """Let the worlds go, and the file."""
-        self._task.close()
-        self._file.close()
+        for held in (self._tools, self._task, self._file):
+            if hasattr(held, "close"):
+                held.close()
 
 
 def places_by_seed(file: Recording, count: int | None = None) -> dict[int, int] | None:

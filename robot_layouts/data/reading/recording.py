@@ -53,6 +53,7 @@ from robot_layouts.data.reading.provenance import (
 )
 from robots import UnreadableFileError, closest_match
 from tasks import TaskEnv
+from tasks.arrays import nested
 from tasks.episode import States
 from tasks.native.controllers import CONTROLLER
 
@@ -391,18 +392,10 @@ class _File:
             arrays = in_order(arrays, texts)
         if texts.get(OBSERVED) not in (None, observed_checksum(arrays)):
             self.refuse(entry, "its observations are damaged: their checksum is another")
-        found: dict[str, Any] = {}
         for name, rows in arrays.items():
-            *path, last = name.split("/")
-            branch = found
-            for key in path:
-                branch = branch.setdefault(key, {})
-            if not last:  # an empty group
-                continue
-            if len(rows) != steps + 1:
+            if len(rows) != steps + 1 and not name.endswith("/"):  # which is an empty group
                 self.refuse(entry, f"its {name} has shape {rows.shape}, not ({steps + 1}, …)")
-            branch[last] = rows
-        return found.get(OBSERVATIONS)
+        return nested(arrays).get(OBSERVATIONS)
 
     def texts(self, entry: EpisodeEntry) -> dict[str, str]:
         """Return the attributes of an episode that say what it is, if it has any."""

@@ -22,7 +22,7 @@ from typing_extensions import NotRequired, TypedDict
 from layouts import Layout
 from layouts.placement import RobotLike
 from objects.shapes import Friction
-from robot_layouts.core.rooms import PACKAGES
+from robot_layouts.core.own_packages import PACKAGES
 from robot_layouts.core.schema import FieldError, Finite, Name, Object, check, length, whole
 from robot_layouts.data.actors import EXPERT, POLICY, definition, name_of
 from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore

@@ -19,14 +19,13 @@ from robot_layouts.data.playing.command_options import (
     stoppable,
     tell,
 )
-from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.executor import Executor, checked_seeds, play_all
 from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.playing.mode_conversion import converted_steps, why_lost
-from robot_layouts.data.playing.replay import RecordedJob, RecordedPlay
+from robot_layouts.data.playing.replay import RecordedJob
 from robot_layouts.data.playing.scheduler import Event, WorkersDied
-from robot_layouts.data.playing.seeds import checked_seeds
 from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.reading.recording import FILE, Recording
+from robot_layouts.data.reading.recording import FILE, Recording, Trajectory
 from robot_layouts.data.recording.episode_files import PartEncoder
 from robot_layouts.data.recording.recorder import Recorder
 from robots import RecordingError
@@ -82,30 +81,20 @@ class ConvertJob(RecordedJob):
     mode: str | Mapping[str, str]
     encoder: PartEncoder
 
-    def __call__(self) -> Callable[[int], bytes | str]:
-        """Open the recording and make its task in both modes, in a worker."""
-        return _ConvertPlay(self)
+    def tools(self, task: TaskEnv) -> TaskEnv:
+        """Return the task in the other mode."""
+        return _in_mode(task, self.mode)
 
-
-class _ConvertPlay(RecordedPlay[ConvertJob]):
-    def __init__(self, job: ConvertJob) -> None:
-        super().__init__(job)
-        self._converted = _in_mode(self._task, job.mode)
-
-    def __call__(self, seed: int) -> bytes | str:
-        """Convert the episode of a seed; what is to be stored of it, or why it does not succeed."""
-        episode, source, task = self.recorded(seed), self._task, self._converted
-        actions, steps = converted_steps(source, seed, episode.actions, task)
-        played = play(task, seed, actions)
+    def play(self, task: TaskEnv, episode: Trajectory, tools: TaskEnv) -> bytes | str:
+        """Convert an episode; what is to be stored of it, or why it does not succeed."""
+        seed, converted = episode.seed, tools
+        assert seed is not None
+        actions, steps = converted_steps(task, seed, episode.actions, converted)
+        played = play(converted, seed, actions)
         if not played.solved:
-            return why_lost(source, seed, episode.actions, task)
+            return why_lost(task, seed, episode.actions, converted)
         actor = None if episode.actor is None else episode.actor[steps]
-        return self._job.encoder.encode(replace(played, source=episode.source, actor=actor))
-
-    def close(self) -> None:
-        """Let the worlds go, and the file."""
-        self._converted.close()
-        super().close()
+        return self.encoder.encode(replace(played, source=episode.source, actor=actor))
 
 
 def _in_mode(task: TaskEnv, mode: str | Mapping[str, str]) -> TaskEnv:

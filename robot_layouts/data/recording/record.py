@@ -28,9 +28,14 @@ from robot_layouts.data.actors import (
     episode_source,
     find_policy,
 )
-from robot_layouts.data.playing.executor import Executor, choose_executor, play_all
+from robot_layouts.data.playing.executor import (
+    Executor,
+    checked_seeds,
+    choose_executor,
+    play_all,
+    seed_lines,
+)
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event, WorkersDied
-from robot_layouts.data.playing.seeds import checked_seeds, seed_lines
 from robot_layouts.data.playing.together import (
     BatchError,
     Cast,

@@ -24,7 +24,6 @@ from robot_layouts.data.playing.executor import Executor, play_all
 from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.playing.replay import (
     RecordedJob,
-    RecordedPlay,
     Replayed,
     Start,
     places_by_seed,
@@ -33,10 +32,11 @@ from robot_layouts.data.playing.replay import (
 from robot_layouts.data.playing.scheduler import Event, WorkersDied
 from robot_layouts.data.reading.json_files import FILE_SIZE
 from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.reading.recording import FILE, Recording
+from robot_layouts.data.reading.recording import FILE, Recording, Trajectory
 from robot_layouts.data.recording.episode_files import PartEncoder
 from robot_layouts.data.recording.recorder import Recorder
 from robots import TaskError
+from tasks import TaskEnv
 from tasks.episode import PlayedEpisode
 
 if TYPE_CHECKING:
@@ -49,25 +49,19 @@ class ReplayJob(RecordedJob):
 
     Attributes:
         start: How each begins; see `robot_layouts.data.playing.replay.replay`.
-        observing: What the task observes, as arguments of `task_for`.
         encoder: What encodes episodes with what was observed in them; None if that is not kept.
     """
 
     start: Start
-    observing: Mapping[str, Any]
     encoder: PartEncoder | None
 
-    def __call__(self) -> Callable[[int], tuple[Replayed, bytes | None]]:
-        """Open the recording and make its task in a worker."""
-        return _ReplayPlay(self, **self.observing)
-
-
-class _ReplayPlay(RecordedPlay[ReplayJob]):
-    def __call__(self, seed: int) -> tuple[Replayed, bytes | None]:
-        """Play the episode of a seed again; what is to be stored of it if it is as recorded."""
-        encoder, kept = self._job.encoder, list[PlayedEpisode]()
+    def play(
+        self, task: TaskEnv, episode: Trajectory, tools: None
+    ) -> tuple[Replayed, bytes | None]:
+        """Play an episode again; what is to be stored of it if it is as recorded."""
+        encoder, kept = self.encoder, list[PlayedEpisode]()
         keep = None if encoder is None else kept.append
-        found = replay(self._task, self.recorded(seed), self._job.start, keep=keep)
+        found = replay(task, episode, self.start, keep=keep)
         return found, encoder.encode(kept[0]) if encoder and kept else None
 
 
@@ -137,7 +131,7 @@ def replay_recording(
         raise TaskError("--obs-mode and --out go together, and not with --from state")
     if observing and folder is None:
         raise TaskError("nothing is drawn without --obs-mode and --out, so cameras do not matter")
-    places = places_by_seed(file, count)
+    places, making = places_by_seed(file, count), dict(cell or {})
     if places is None:
         if folder is not None or not isinstance(executor, InProcessExecutor):
             raise TaskError(
@@ -147,8 +141,8 @@ def replay_recording(
         places = dict(zip(*[range(len(file.seeds[:count]))] * 2, strict=True))
     summary, recorder = ReplaySummary(len(places)), None
     if folder is not None:
-        observing["obs_mode"] = obs_mode
-        recorder = _recorder(file, folder, file_size, {**(cell or {}), **observing})
+        making |= {"obs_mode": obs_mode, **observing}
+        recorder = _recorder(file, folder, file_size, making)
     with nullcontext() if recorder is None else recorder:
         there = set[int]() if recorder is None else recorder.seeds
         missing = [seed for seed in places if seed not in there]
@@ -157,8 +151,7 @@ def replay_recording(
         if recorder is not None:
             recorder.expect(missing)
         encoder = None if recorder is None else recorder.encoder
-        about = RecordedJob.about(file, places, cell)
-        job = ReplayJob(**about, start=start, observing=observing, encoder=encoder)
+        job = ReplayJob(**RecordedJob.about(file, places, making), start=start, encoder=encoder)
         with closing(play_all(executor, job, missing)) as events:
             for event in events:
                 _note(summary, event, places, recorder)

@@ -27,7 +27,7 @@ from layouts.presets import PRESETS
 from layouts.yaml_format import to_yaml
 from robot_layouts.core.bounds import shown
 from robot_layouts.core.writing import write_whole
-from robot_layouts.data.playing.seeds import checked_seeds
+from robot_layouts.data.playing.executor import checked_seeds
 from robot_layouts.data.reading.json_files import spans_of
 from robot_layouts.data.reading.provenance import descriptor_digest
 from robots import LayoutError, RobotDescriptor, RobotLayoutsError, TaskError, UnknownNameError

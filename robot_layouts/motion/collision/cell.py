@@ -65,6 +65,12 @@ class Cell(Bodies):
             return Checker(self, pairs[~is_own], clearance)
         return Checker(self, pairs, np.where(is_own, own, clearance))
 
+    def between_owners(self) -> Checker:
+        """Return what measures how near different robots and other bodies come to each other."""
+        pairs, solids = self.checker().pairs, self.solids
+        apart = [solids[a].owner != solids[b].owner for a, b in pairs.tolist()]
+        return Checker(self, pairs[np.array(apart, bool)], 0.0)
+
     def grasped(self, place: str, obstacle: Obstacle, qpos: ArrayLike | None = None) -> Held:
         """Return a body as it is held by an arm that grasps it where it is.
 

@@ -64,7 +64,7 @@ class Curve:
         return Intervals(starts, ends, lengths, np.abs(points).max(axis=0))
 
 
-class CurveCheck(NamedTuple):
+class SeenAlong(NamedTuple):
     """What was seen along a curve.
 
     Attributes:
@@ -78,17 +78,31 @@ class CurveCheck(NamedTuple):
     sparse: Floats
 
 
-class _CurveCheck:
-    """A look along a curve; see `check_along`."""
+class CurveCheck:
+    """A look for overlaps along all of a curve."""
 
     def __init__(
         self, cell: Bodies, checker: Checker, curve: Curve, step: float, turn: float
     ) -> None:
+        """Prepare it.
+
+        Args:
+            cell: The cell.
+            checker: What may not overlap.
+            curve: Where all coordinates are.
+            step: The farthest that any point may travel between two moments (m).
+            turn: The farthest that any body may turn between two moments (rad).
+        """
         self._checker, self._curve, self._step, self._turn = checker, curve, step, turn
         self._travel = TravelBounds(cell)
         self._parts = np.array([solid.part for solid in cell.solids], np.intp)
 
-    def run(self) -> CurveCheck:
+    def run(self) -> SeenAlong:
+        """Return what is seen.
+
+        Raises:
+            MotionError: If it takes too many moments.
+        """
         times = self._curve.times
         waiting = [(times, np.append(times[1:], times[-1]))]  # the last one is a moment
         self._expect_few(*waiting[0])
@@ -112,7 +126,7 @@ class _CurveCheck:
             marks = np.cumsum([travelled, *moved.max(axis=1)])
             sparse.append(ways.starts[np.diff(marks // SPARSE) > 0])
             travelled = marks[-1]
-        return CurveCheck(
+        return SeenAlong(
             moments, np.unique(np.concatenate(overlaps)), np.unique(np.concatenate(sparse))
         )
 
@@ -149,24 +163,6 @@ class _CurveCheck:
             undecided.append(found.states[(nearing > FINEST) & (gaps < nearing + ROUNDING)])
         hits = np.unique(np.concatenate(overlapping))
         return hits, np.setdiff1d(np.concatenate(undecided), hits)
-
-
-def check_along(
-    cell: Bodies, checker: Checker, curve: Curve, step: float, turn: float
-) -> CurveCheck:
-    """Look for overlaps along all of a curve.
-
-    Args:
-        cell: The cell.
-        checker: What may not overlap.
-        curve: Where all coordinates are.
-        step: The farthest that any point may travel between two moments (m).
-        turn: The farthest that any body may turn between two moments (rad).
-
-    Raises:
-        MotionError: If that takes too many moments.
-    """
-    return _CurveCheck(cell, checker, curve, step, turn).run()
 
 
 def _cut(ways: Intervals, pieces: Floats) -> tuple[Floats, Floats]:

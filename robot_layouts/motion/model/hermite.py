@@ -65,16 +65,6 @@ def hermite_extremes(knots: Floats, values: Floats, slopes: Floats) -> tuple[Flo
     )
 
 
-def hermite_bends(knots: Floats, values: Floats, slopes: Floats) -> Floats:
-    """Return the second derivatives at both ends of each piece, (T - 1, 2, n) (per s²)."""
-    step = np.diff(knots)[:, None]
-    rise = np.diff(values, axis=0) / step
-    leave, arrive = slopes[:-1], slopes[1:]
-    first = (6.0 * rise - 4.0 * leave - 2.0 * arrive) / step
-    last = (2.0 * leave + 4.0 * arrive - 6.0 * rise) / step
-    return np.stack([first, last], axis=1)
-
-
 def _places(knots: Floats, times: ArrayLike) -> tuple[Floats, np.ndarray, Floats]:
     """Return times within the knots, the piece that each lies in, and how long that is (s)."""
     at = np.clip(np.asarray(times, float), knots[0], knots[-1])

@@ -28,7 +28,7 @@ from robot_layouts.core.schema import AnyText, check, exactly, length, within
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.model.obstacles import Held, Obstacle, Track
-from robot_layouts.motion.output.protocol import TimedMotion
+from robot_layouts.motion.timed_motion import TimedMotion
 from robots import RobotLayoutsError, UnreadableFileError
 
 FORMAT, VERSION = "robot-layouts motion", 1

@@ -8,8 +8,8 @@ from layouts.viewer import ShownCell, ShownMotion, Thing
 from layouts.visuals import Visual, coloured
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robot_layouts.motion.model.obstacles import Obstacle, Track
-from robot_layouts.motion.output.protocol import TimedMotion
 from robot_layouts.motion.output.scenes import Scenes
+from robot_layouts.motion.timed_motion import TimedMotion
 
 HIDDEN = ("frames", "reach")  # they would hide the ways
 MOMENTS = 30  # per second

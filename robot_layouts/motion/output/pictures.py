@@ -20,8 +20,8 @@ from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import forward
 from robot_layouts.kinematics.rotations import Floats, transform
 from robot_layouts.motion.model.bodies import CellSolid
-from robot_layouts.motion.output.protocol import TimedMotion
 from robot_layouts.motion.output.scenes import Scenes
+from robot_layouts.motion.timed_motion import TimedMotion
 from robots import MissingPackageError
 
 if TYPE_CHECKING:

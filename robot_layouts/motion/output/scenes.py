@@ -6,14 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from layouts.layout import Layout
 from robot_layouts.kinematics.rotations import Floats, transform
+from robot_layouts.motion.certificate import largest_velocities
 from robot_layouts.motion.collision.cell import Cell
-from robot_layouts.motion.collision.checker import Checker
 from robot_layouts.motion.model.bodies import CellSolid
 from robot_layouts.motion.model.obstacles import Held
-from robot_layouts.motion.output.protocol import TimedMotion
-from robot_layouts.motion.timing import velocities
+from robot_layouts.motion.timed_motion import TimedMotion
 from robots.urdf.tcp import find_tcp
 
 
@@ -89,9 +87,7 @@ class Scenes:
 
     def distances(self, times: Floats) -> Distances:
         """Return how near robots come to each other and to what stands around."""
-        solids, whole = self.cell.solids, self.cell.checker()
-        apart = [solids[a].owner != solids[b].owner for a, b in whole.pairs.tolist()]
-        checker = Checker(self.cell, whole.pairs[np.array(apart, bool)], 0.0)
+        checker = self.cell.between_owners()
         contacts = [
             checker.nearest(state, time)
             for state, time in zip(self.states(times), times.tolist(), strict=True)
@@ -104,7 +100,7 @@ class Scenes:
 
     def speeds(self, times: Floats) -> dict[str, Floats]:
         """Return by robot the largest share that a joint uses of its largest velocity, (n,)."""
-        fastest = largest_velocities(self.motion, self.motion.layout)
+        fastest = largest_velocities(self.motion)
         return {
             name: (np.abs(rows) / fastest[name]).max(axis=1)
             for name, rows in self.motion.velocity(times).items()
@@ -113,11 +109,3 @@ class Scenes:
 
 def _stands(cell: Cell, solid: CellSolid) -> bool:
     return not solid.mover and cell.parts[solid.part].track is None
-
-
-def largest_velocities(motion: TimedMotion, layout: Layout) -> dict[str, Floats]:
-    """Return how fast each robot's joints may move, (dof,) (rad/s, m/s)."""
-    return {
-        **velocities.largest_velocities(layout, "pd_joint_pos"),
-        **motion.largest_velocities,
-    }

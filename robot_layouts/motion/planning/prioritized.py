@@ -57,32 +57,19 @@ class _Group:
         return self.schedule[min(tick, len(self.schedule) - 1)]
 
 
-def coordinated(
-    space: Space,
-    clearances: Clearances,
-    start: Floats,
-    goal: Floats,
-    seed: int,
-    resolution: Resolution,
-) -> Floats | None:
-    """Return points of a free path of all robots from a start to a goal, or None.
+@dataclass(eq=False)
+class Coordination:
+    """A search in which each robot plans alone, and then they wait for each other.
 
-    Args:
+    Attributes:
         space: The coordinates of all robots that move.
         clearances: What has to keep clear of what.
         start: (d,) (rad, m).
         goal: (d,) (rad, m).
         seed: Of everything random.
         resolution: Of the path.
-
-    Raises:
-        NoPlanError: If one robot finds no path even alone, or the time given is over.
     """
-    return _Coordination(space, clearances, start, goal, seed, resolution).run()
 
-
-@dataclass(eq=False)
-class _Coordination:
     space: Space
     clearances: Clearances
     start: Floats
@@ -92,6 +79,11 @@ class _Coordination:
     _meetings: dict[_Pair, _Meeting] = field(default_factory=dict)
 
     def run(self) -> Floats | None:
+        """Return points of a free path of all robots from the start to the goal, or None.
+
+        Raises:
+            NoPlanError: If one robot finds no path even alone, or the time given is over.
+        """
         groups = [self._alone(name) for name in self.space.robots]
         while len(groups) > 1:
             stuck = self._schedule(groups)

@@ -17,7 +17,7 @@ from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.planning.goals import CANDIDATES, PlaceGoal, different
 from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs
-from robot_layouts.motion.planning.prioritized import coordinated
+from robot_layouts.motion.planning.prioritized import Coordination
 from robot_layouts.motion.planning.rrt_connect import connect
 from robot_layouts.motion.planning.shortcuts import rounded, shortened
 from robot_layouts.motion.planning.space import Resolution, Space
@@ -333,9 +333,9 @@ class Query:
         few = len(space.robots) <= FEW
         points = together(restarts=int(few))
         if points is None and len(space.robots) > 1:
-            points = coordinated(
+            points = Coordination(
                 space, self.clearances, start, goals[0], self.seed, self.resolution
-            )
+            ).run()
         return together(first=int(few), restarts=RESTARTS) if points is None else points
 
     def _not_found(self, robots: Collection[str]) -> NoPlanError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,7 +50,9 @@ class Space:
     purpose: str = "searching"
     when: float | None = None
     proofs: InfeasibilityProofs | None = None
-    _known: dict[tuple[bytes, bytes, Resolution], bool] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[bytes, bytes, Resolution], bool] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def whole(self, places: Floats) -> Floats:
         """Return all coordinates of the cell at some places, (…, D).
@@ -116,18 +118,14 @@ class Space:
         """
         robots = tuple(robots)
         chosen = self.columns(robots)
-        return Space(
-            self.cell,
-            robots,
-            self.free[chosen],
-            self.base,
-            self.bounds[chosen],
-            self.speeds[chosen],
-            checker,
-            self.progress,
-            f"planning {', '.join(robots)}",
-            self.when,
-            self.proofs,
+        return replace(
+            self,
+            robots=robots,
+            free=self.free[chosen],
+            bounds=self.bounds[chosen],
+            speeds=self.speeds[chosen],
+            checker=checker,
+            purpose=f"planning {', '.join(robots)}",
         )
 
     def columns(self, robots: Iterable[str]) -> NDArray[np.intp]:

@@ -16,7 +16,7 @@ from layouts import Layout
 from robot_layouts.core.bounds import checked_number, shown
 from robot_layouts.core.errors import MissingPackageError, MotionError
 from robot_layouts.kinematics.rotations import Floats
-from robot_layouts.motion.timing.paths import Path, without_straight_points
+from robot_layouts.motion.timing.paths import Path
 from robots import RobotDescriptor
 from robots.action_split import JointGroup
 from robots.urdf.reading import read_model
@@ -200,12 +200,6 @@ def _knots(run: Path, grid: Floats, speed: Floats) -> tuple[Floats, Floats, Floa
     positions = run.at(at)
     positions[[0, -1]] = run.points[[0, -1]]
     return times, positions, run.at(at, 1) * rate[:, None]
-
-
-def straightened(points: Floats, speeds: Floats) -> Path:
-    """Return the path through points that stops wherever it turns."""
-    points = without_straight_points(points, speeds)
-    return Path(points, np.zeros(len(points)), speeds)
 
 
 def _driven_speeds(robot: RobotDescriptor, frequency: float) -> Floats:

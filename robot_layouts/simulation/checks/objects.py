@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
+from string import Template
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
@@ -49,7 +51,6 @@ _AJAR = 4e-3  # m; between each finger and what it is to hold, before it closes
 _CLOSING, _HOLDING, _SHAKING = 80, 20, 60  # steps; the last along each axis
 _SWAY, _PERIOD = 0.0125, 20  # m to both sides, and steps: 12 m/s²
 _WEIGHTLESS = replace(SAPIEN_DEFAULTS, gravity=(0.0, 0.0, 0.0))
-_PAD, _TIP, _ROOT = (0.02, 0.01), 0.01, -0.045  # m; of fingers: section, and ends along z
 _SQUEEZE = 0.05  # m by which fingers are driven beyond each other
 _NEXT_TO_NOTHING = 0.1  # kg/m³
 _LEAST, _PER_MASS = 8.0, 70.0  # N and N/kg: how hard jaws press
@@ -285,7 +286,9 @@ def two_jaw_hand(opening: float, folder: Path, force: float = _LEAST) -> RobotDe
         UnwritableFileError: If it cannot be written.
     """
     path = folder / f"hand_{opening * 1e3:.0f}.urdf"
-    write_whole(path, _hand_urdf(opening))
+    model = files("robot_layouts.simulation.checks") / "two_jaw_hand.urdf.txt"
+    text = Template(model.read_text(encoding="utf-8"))
+    write_whole(path, text.substitute(half=opening / 2, squeeze=_SQUEEZE, wide=opening + 0.06))
     slides, jaws = ("slide_x", "slide_y", "slide_z"), ("left", "right")
     return RobotDescriptor(
         name="two_jaw_hand",
@@ -321,41 +324,4 @@ def two_jaw_hand(opening: float, folder: Path, force: float = _LEAST) -> RobotDe
         gripper_material=GripperMaterial(("left_jaw", "right_jaw"), 1.0, 1.0),
         reach=1.0,
         source="robot_layouts.simulation.checks.objects",
-    )
-
-
-def _hand_urdf(opening: float) -> str:
-    x, y = _PAD
-    middle, long = (_TIP + _ROOT) / 2, _TIP - _ROOT
-    parts = [_link("base", 1.0)]
-    parent = "base"
-    for axis, child in (("x", "carriage_x"), ("y", "carriage_y"), ("z", "palm")):
-        way = " ".join("1" if axis == other else "0" for other in "xyz")
-        parts.append(_joint(f"slide_{axis}", parent, child, way, -1.0, 1.0))
-        palm = (0.05, opening + 0.06, 0.02), (0.0, 0.0, _ROOT - 0.01)
-        parts.append(_link(child, 0.3, *(palm if child == "palm" else ())))
-        parent = child
-    for jaw, side in (("left", 1), ("right", -1)):
-        parts.append(_joint(jaw, "palm", f"{jaw}_jaw", f"0 {side} 0", -_SQUEEZE, opening / 2))
-        parts.append(_link(f"{jaw}_jaw", 0.1, (x, y, long), (0.0, side * y / 2, middle)))
-    return f'<robot name="two_jaw_hand">{"".join(parts)}</robot>'
-
-
-def _link(name: str, mass: float, size: Sequence[float] = (), place: Sequence[float] = ()) -> str:
-    spin = mass * 1e-3  # kg·m²
-    inertia = f'ixx="{spin}" iyy="{spin}" izz="{spin}" ixy="0" ixz="0" iyz="0"'
-    inertial = f'<inertial><mass value="{mass}"/><inertia {inertia}/></inertial>'
-    collision = ""
-    if size:
-        shape = f'<geometry><box size="{" ".join(map(str, size))}"/></geometry>'
-        collision = f'<collision><origin xyz="{" ".join(map(str, place))}"/>{shape}</collision>'
-    return f'<link name="{name}">{inertial}{collision}</link>'
-
-
-def _joint(name: str, parent: str, child: str, axis: str, low: float, high: float) -> str:
-    mimic = '<mimic joint="left"/>' if name == "right" else ""  # so that they close evenly
-    limit = f'<limit lower="{low}" upper="{high}" effort="10000" velocity="10"/>'
-    return (
-        f'<joint name="{name}" type="prismatic"><parent link="{parent}"/><child link="{child}"/>'
-        f'<axis xyz="{axis}"/>{limit}{mimic}</joint>'
     )

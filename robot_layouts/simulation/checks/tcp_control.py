@@ -13,8 +13,6 @@ from robot_layouts.kinematics.rotations import (
     inverse,
     multiply,
     rotate,
-    rotation_of,
-    rotation_vector,
     xyz_angles,
 )
 from robot_layouts.simulation.checks.trial import NAME, RobotAlone
@@ -36,7 +34,6 @@ class TcpTrial(NamedTuple):
         arm: The robot, or the limb, by its name in the layout.
         mode: The control mode.
         drift: How far the TCP went from its start under an action that holds it (m).
-        turn_drift: How far it turned (rad).
         corner: How far it stayed from that corner of a square of which most went unreported (m).
         reported: How far the mode said that it would stay (m); 0 if it reports nothing.
         turn_reported: By how much it gave up the orientation in some corner, at most (rad).
@@ -45,7 +42,6 @@ class TcpTrial(NamedTuple):
     arm: str
     mode: str
     drift: float
-    turn_drift: float
     corner: float
     reported: float
     turn_reported: float
@@ -83,7 +79,7 @@ def try_tcp_control(
     for arm in single({NAME: robot}).places.values():
         for mode in modes:
             square = _Square(robot, arm, mode)
-            yield TcpTrial(arm, mode, *square.hold(), *square.follow(side))
+            yield TcpTrial(arm, mode, square.hold(), *square.follow(side))
 
 
 class _Square:
@@ -101,16 +97,15 @@ class _Square:
         self._start = self._pose()
         self._sent = self._start[:3]
 
-    def hold(self) -> tuple[float, float]:
-        """Hold the TCP; return how far it went (m) and turned (rad) at most."""
-        drifts = [(0.0, 0.0)]
+    def hold(self) -> float:
+        """Hold the TCP; return how far it went at most (m)."""
+        drifts = [0.0]
         for _ in range(_HELD):
             action = self._still.copy()
             action[self._numbers] = 0.0 if self._group.delta else self._absolute(self._start)
             self._alone.step(action)
             drifts.append(self._away(self._start))
-        moved, turned = np.nan_to_num(drifts, nan=np.inf).max(axis=0)
-        return float(moved), float(turned)
+        return float(np.nan_to_num(drifts, nan=np.inf).max())
 
     def follow(self, side: float) -> tuple[float, float, float]:
         """Send the TCP along a square; return what it missed most, and what was reported there.
@@ -128,7 +123,7 @@ class _Square:
             there[:3] += side * corner
             for step in range(1, _ON_A_SIDE + _IN_A_CORNER + 1):
                 self._send(here + min(step / _ON_A_SIDE, 1.0) * (there - here))
-            corners.append((self._away(there)[0], *self._reported()))
+            corners.append((self._away(there), *self._reported()))
             here = there
         seen = np.nan_to_num(corners, nan=np.inf)
         corner, reported, _ = seen[(seen[:, 0] - seen[:, 1]).argmax()].tolist()
@@ -154,10 +149,8 @@ class _Square:
         place, turn = rotate(back, goal[:3] - root[:3]), multiply(back, goal[3:])
         return np.concatenate([place, xyz_angles(turn)])
 
-    def _away(self, goal: Floats) -> tuple[float, float]:
-        pose = self._pose()
-        turn = rotation_vector(rotation_of(multiply(goal[3:], inverse(pose[3:]))))
-        return float(np.linalg.norm(goal[:3] - pose[:3])), float(np.linalg.norm(turn))
+    def _away(self, goal: Floats) -> float:
+        return float(np.linalg.norm(goal[:3] - self._pose()[:3]))
 
     def _pose(self) -> Floats:
         return self._alone.simulation.read().tcp_pose(self._arm)[0].astype(float)

@@ -6,6 +6,7 @@ What control modes ask for besides is in `robot_layouts.simulation.control`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,43 @@ import numpy as np
 from layouts import Layout
 from robot_layouts.simulation.maths import Floats
 from robots import JointGroup
+
+
+@dataclass(frozen=True)
+class DrivenGroup:
+    """A joint group of a layout, in its control mode.
+
+    Attributes:
+        robot: Name of its robot in the layout.
+        name: Its own.
+        arm: The robot or limb that it belongs to; None if that has no TCP.
+        group: What is driven, and how.
+        numbers: Where its numbers stand in an action.
+        joints: Where its joints are among those of all robots.
+        own: Where its robot's joints are among those of all robots.
+    """
+
+    robot: str
+    name: str
+    arm: str | None
+    group: JointGroup
+    numbers: slice
+    joints: slice
+    own: slice
+
+
+def driven_groups(layout: Layout) -> Iterator[DrivenGroup]:
+    """Yield the joint groups of a layout, also those that are held, in the order of the action."""
+    arms = layout.arms_by_group
+    number = joint = 0
+    for robot, placement in layout.items():
+        groups = placement.robot.action_split.groups
+        own = slice(joint, joint + sum([len(group.joints) for group in groups.values()]))
+        for name, group in groups.items():
+            numbers = slice(number, number + group.size)
+            joints = slice(joint, joint + len(group.joints))
+            yield DrivenGroup(robot, name, arms.get((robot, name)), group, numbers, joints, own)
+            number, joint = numbers.stop, joints.stop
 
 
 class JointPositionController:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.simulation.backend import Backend
-from robot_layouts.simulation.control.joint_positions import JointPositionController
-from robot_layouts.simulation.control.tcp import TcpController, TcpGroup
+from robot_layouts.simulation.control.joint_positions import (
+    DrivenGroup,
+    JointPositionController,
+    driven_groups,
+)
+from robot_layouts.simulation.control.tcp import TcpController
 from robot_layouts.simulation.maths import Floats, cos, sin
 from robot_layouts.simulation.readout import ReadoutIndex
 from robot_layouts.simulation.state import State
-from robots import JointGroup
 
 
 class Remembered(NamedTuple):
@@ -34,17 +37,6 @@ class Remembered(NamedTuple):
     size: int
 
 
-class _DrivenGroup(NamedTuple):
-    """A joint group: whose it is, and where its numbers and joints are among all."""
-
-    robot: str
-    name: str
-    group: JointGroup
-    numbers: slice
-    joints: range
-    own: slice
-
-
 class ModeController:
     """Turns actions into targets of positions and velocities, for robots in any control mode.
 
@@ -61,7 +53,7 @@ class ModeController:
             positions: What drives those joint groups that take positions.
         """
         self._positions = positions
-        driven = list(_driven(layout))
+        driven = list(driven_groups(layout))
         self._from_target = np.zeros(positions.dof, bool)
         self._velocity_joints, self._velocity_numbers = _velocities(driven)
         self._bases = [
@@ -70,14 +62,11 @@ class ModeController:
         self.moves = len(self._velocity_joints) > 0 or bool(self._bases)
         for part in driven:
             if part.group.target and part.group.asks.positions:
-                self._from_target[part.joints.start : part.joints.stop] = True
+                self._from_target[part.joints] = True
         self._any_target = bool(self._from_target.any())
         self._scale = _scale(driven)
-        owners = layout.arms_by_group
         self._tools = {
-            (part.robot, part.name): TcpController(
-                _tcp_group(part, layout, owners[part.robot, part.name])
-            )
+            (part.robot, part.name): TcpController(part, layout)
             for part in driven
             if part.group.asks.tcp
         }
@@ -88,7 +77,7 @@ class ModeController:
                 part.robot,
                 part.name,
                 "target_pose" if part.group.asks.tcp else "target_qpos",
-                7 if part.group.asks.tcp else len(part.joints),
+                7 if part.group.asks.tcp else len(part.group.joints),
             )
             for part in self._kept
         ]
@@ -154,7 +143,7 @@ class ModeController:
         Of arms alone that go as near as they get where a pose cannot be reached.
         """
         return {
-            control.tool.arm: control.shortfalls
+            control.arm: control.shortfalls
             for control in self._tools.values()
             if control.tool.group.approximates
         }
@@ -179,25 +168,14 @@ class ModeController:
         low, high, centre, half = self._scale
         return centre + half * np.minimum(np.maximum(action, low), high)
 
-    def _rows(self, part: _DrivenGroup) -> Floats:
+    def _rows(self, part: DrivenGroup) -> Floats:
         """Return a view of what is remembered of a joint group."""
         if not part.group.asks.tcp:
-            return self.targets[:, part.joints.start : part.joints.stop]
+            return self.targets[:, part.joints]
         return self._tools[part.robot, part.name].targets
 
 
-def _driven(layout: Layout) -> Iterable[_DrivenGroup]:
-    number = joint = 0
-    for robot, placement in layout.items():
-        own = slice(joint, joint + placement.robot.dof)
-        for name, group in placement.robot.action_split.groups.items():
-            numbers = slice(number, number + group.size)
-            joints = range(joint, joint + len(group.joints))
-            yield _DrivenGroup(robot, name, group, numbers, joints, own)
-            number, joint = numbers.stop, joints.stop
-
-
-def _scale(driven: Sequence[_DrivenGroup]) -> Floats:
+def _scale(driven: Sequence[DrivenGroup]) -> Floats:
     """Return lowest, highest, centre and half range of every action number, (4, A)."""
     rows: list[tuple[float, float, float, float]] = []
     for part in driven:
@@ -211,18 +189,12 @@ def _scale(driven: Sequence[_DrivenGroup]) -> Floats:
     return np.array(rows, np.float32).T
 
 
-def _velocities(driven: Sequence[_DrivenGroup]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _velocities(driven: Sequence[DrivenGroup]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the joints that are driven to velocities, and the action numbers that say to which."""
     joints: list[int] = []
     numbers: list[int] = []
     for part in driven:
         if part.group.asks.velocities:
-            joints += part.joints
-            numbers += range(part.numbers.stop - len(part.joints), part.numbers.stop)
+            joints += range(part.joints.start, part.joints.stop)
+            numbers += range(part.numbers.stop - len(part.group.joints), part.numbers.stop)
     return np.array(joints, np.intp), np.array(numbers, np.intp)
-
-
-def _tcp_group(part: _DrivenGroup, layout: Layout, arm: str) -> TcpGroup:
-    body, limb = layout[part.robot].robot, layout.arm(arm).robot
-    joints = slice(part.joints.start, part.joints.stop)
-    return TcpGroup(part.robot, arm, part.group, body, limb, part.numbers, joints, part.own)

@@ -3,36 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from layouts import Layout
 from robot_layouts.kinematics.quaternions import inverted, multiplied
 from robot_layouts.simulation.backend import Backend, Joints, PoseFollower
 from robot_layouts.simulation.control.approximate import ApproximateArm, nearest_turns
-from robot_layouts.simulation.maths import Floats, cos, norm, sin, sqrt
+from robot_layouts.simulation.control.joint_positions import DrivenGroup
+from robot_layouts.simulation.maths import Floats, cos, norm, sin
 from robot_layouts.simulation.readout import ReadoutIndex
+from robot_layouts.simulation.rotations import Row, quaternion, upright
 from robot_layouts.simulation.state import State
-from robots import JointGroup, RobotDescriptor
 from robots.action_split import JOINTS_OF_A_POSE
 
-Number = np.float32
-Row = tuple[Number, ...]
-
-_ONE, _TWO = np.float32(1), np.float32(2)
-_NOTHING = np.float32(0)
-_LEAST_ROOT = np.float32(0.1)
+_ONE, _NOTHING = np.float32(1), np.float32(0)
 
 
 def row(numbers: Iterable[Any]) -> Row:
     """Return numbers of a float32 array one by one."""
     return tuple(numbers)
-
-
-def upright(quaternion: Row) -> Row:
-    """Return a quaternion with w ≥ 0."""
-    w, x, y, z = quaternion
-    return (-w, -x, -y, -z) if w < _NOTHING else quaternion
 
 
 def turned(quaternion: Row, point: Row) -> Row:
@@ -70,61 +61,10 @@ def rotation(angles: Floats) -> Row:
     )
 
 
-def quaternion(first: Row, second: Row, third: Row) -> Row:
-    """Return the quaternion, w ≥ 0, of the three rows of a rotation matrix.
-
-    Of the four ways to read it off, the one that divides by the largest number.
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = first, second, third
-    squares = np.array(
-        [
-            _ONE + xx + yy + zz,
-            _ONE + xx - yy - zz,
-            _ONE - xx + yy - zz,
-            _ONE - xx - yy + zz,
-        ]
-    )
-    roots = sqrt(np.maximum(squares, _NOTHING))
-    largest = int(roots.argmax())
-    root = roots[largest]
-    found = (
-        (root * root, zy - yz, xz - zx, yx - xy),
-        (zy - yz, root * root, yx + xy, xz + zx),
-        (xz - zx, yx + xy, root * root, zy + yz),
-        (yx - xy, zx + xz, zy + yz, root * root),
-    )[largest]
-    divisor = _TWO * max(root, _LEAST_ROOT)
-    return upright(tuple(number / divisor for number in found))
-
-
 def clipped_turn(angles: Floats) -> Floats:
     """Return angles, (3,), scaled down to a norm of 1 if theirs is above."""
     length = norm(angles[None])[0]
     return angles * (_ONE / length) if length > _ONE else angles
-
-
-class TcpGroup(NamedTuple):
-    """A joint group whose action numbers ask for a TCP.
-
-    Attributes:
-        robot: Name of the robot in the layout.
-        arm: Name of the robot or the limb whose TCP it is.
-        group: What drives it.
-        body: The robot.
-        limb: The robot, or its limb.
-        numbers: Where its action numbers are in the flat action.
-        joints: Where its joints are among those of all robots.
-        own: Where the robot's joints are among those of all robots.
-    """
-
-    robot: str
-    arm: str
-    group: JointGroup
-    body: RobotDescriptor
-    limb: RobotDescriptor
-    numbers: slice
-    joints: slice
-    own: slice
 
 
 class TcpController:
@@ -132,14 +72,17 @@ class TcpController:
 
     Attributes:
         tool: The joint group.
+        arm: Name of the robot or the limb whose TCP it is.
         targets: Where the TCP was last asked to be in its root link's frame, (N, 7).
         shortfalls: By how much the joints of the last step miss what it asked for, if the group
             approximates: place (m) and orientation (rad), (N, 2).
     """
 
-    def __init__(self, tool: TcpGroup) -> None:
+    def __init__(self, tool: DrivenGroup, layout: Layout) -> None:
         """Take what is driven."""
-        self.tool, group = tool, tool.group
+        assert tool.arm is not None
+        self.tool, self.arm, group = tool, tool.arm, tool.group
+        self._robot, self._limb = layout[tool.robot].robot, layout.arm(tool.arm).robot
         start = tool.numbers.start
         self._place, self._angles = slice(start, start + 3), slice(start + 3, start + 6)
         moves, turns = group.frame.split(":")
@@ -158,10 +101,10 @@ class TcpController:
         """Find the frames, and what solves for joints."""
         tool, links = self.tool, index.links[self.tool.robot]
         root_link = tool.group.root_link
-        self._tcp_frame, self._link_frame = index.tcps[tool.arm], links[tool.limb.tcp_link]
+        self._tcp_frame, self._link_frame = index.tcps[self.arm], links[self._limb.tcp_link]
         self._root_frame = index.bases[tool.robot] if root_link is None else links[root_link]
         self._follower = backend.pose_follower(
-            tool.robot, tool.limb.tcp_link, root_link, tool.group.joints
+            tool.robot, self._limb.tcp_link, root_link, tool.group.joints
         )
         own = slice(tool.joints.start - tool.own.start, tool.joints.stop - tool.own.start)
         self._limits = index.robots[tool.robot].limits[own]
@@ -217,7 +160,7 @@ class TcpController:
             if found is not None:
                 return found, (0.0, 0.0)
         if self._arm is None:
-            self._arm = ApproximateArm(tool.body, tool.limb, tool.group)
+            self._arm = ApproximateArm(self._robot, self._limb, tool.group)
         return self._arm.nearest(np.array(wanted, float), joints[tool.own])
 
     def _wanted(self, action: Floats, scaled: Floats, state: State, env: int) -> Row:

@@ -144,10 +144,7 @@ def _links_of_arms(robot: SimulatedRobot) -> Iterator[tuple[tuple[str, str], Any
 
 def overlaps_in(world: BuiltWorld) -> list[Overlap]:
     """Return which parts of a world are inside each other, by the contacts of the last step."""
-    parts: dict[int, Part] = {}
-    for robot in world.robots.values():
-        parts.update((id(link), Part(robot.name, name)) for name, link in robot.links.items())
-    parts.update((id(body.component), Part(None, name)) for name, body in world.bodies.items())
+    parts = {id(component): part for part, component in components_of(world)}
     found: list[Overlap] = []
     for contact in world.system.get_contacts():
         depth = max((-point.separation for point in contact.points), default=0.0)

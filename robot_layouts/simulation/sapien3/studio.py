@@ -314,7 +314,7 @@ def look_at(eye: Vector3, target: Vector3) -> sapien.Pose:
         up = torch.tensor([[1.0, 0.0, 0.0]])  # straight down or up: +x is up in the picture
     left = _unit(torch.linalg.cross(up, forward))
     axes = torch.stack([forward, left, torch.linalg.cross(forward, left)], dim=-1)
-    return sapien.Pose(start.tolist(), quaternion(axes[0]).tolist())
+    return sapien.Pose(start.tolist(), list(map(float, quaternion(*axes[0].numpy()))))
 
 
 def _unit(rows: torch.Tensor) -> torch.Tensor:

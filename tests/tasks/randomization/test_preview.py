@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 
 import tasks
+from robot_layouts.__main__ import main
 from robots import RobotLayoutsError, UnknownNameError
 from tasks import Camera, CameraShift, Light, Randomization, TaskEnv, Uniform
-from tasks.__main__ import main
 from tasks.preview import draws, save
 
 pytestmark = pytest.mark.usefixtures("renderer")
@@ -64,8 +64,8 @@ def test_the_command_saves_a_picture(tmp_path: Path, capsys: pytest.CaptureFixtu
     varied, out = tmp_path / "varied.yaml", tmp_path / "twelve.png"
     Randomization(lights=DIM).save(varied)
     words = ["preview", "PickCube-v1", "--randomization", str(varied), "--draws", "2"]
-    assert main([*words, "--out", str(out)]) == 0
+    assert main(["tasks", *words, "--out", str(out)]) == 0
     assert Image.open(out).size == (2 * 256 + 4, 256)
     assert str(out) in capsys.readouterr().out
-    assert main([*words, "--out", "picture.gif"]) == 1
+    assert main(["tasks", *words, "--out", "picture.gif"]) == 1
     assert ".png" in capsys.readouterr().err
