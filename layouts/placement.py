@@ -187,7 +187,7 @@ class Placement:
             UnknownNameError: If there is no such robot, or it lacks the keyframe.
         """
         robot = load_robot(robot)
-        qpos = self.qpos if robot.joints == self.robot.joints else None
+        qpos = self.qpos if self.qpos and robot.joints == self.robot.joints else None
         before, after = self.robot.home.quaternion, robot.home.quaternion
         if before == after or (self.quaternion is None and self.rpy is None):
             return replace(self, robot=robot, qpos=qpos)

@@ -51,8 +51,8 @@ class WorldBody:
     anchored: bool = False
     marker: bool = False
     scale: float = field(default=1.0, repr=False)
-    joints: tuple[Joint, ...] = ()
-    part_of: str | None = None
+    joints: tuple[Joint, ...] = field(default=(), repr=False)
+    part_of: str | None = field(default=None, repr=False)
 
 
 def part_name(body: str, joint: str) -> str:
@@ -173,7 +173,7 @@ class World:
             UnknownNameError: If a joint is carried by none of those before it.
         """
         self._check_body(name, shapes, kind)
-        joints = checked_joints(f"body {name!r}", joints)
+        joints = checked_joints(f"body {name!r}", joints) if joints else ()
         if name in self.bodies:
             raise SimulationError(f"this world already has a body called {name!r}")
         self._pose(name, position, quaternion)

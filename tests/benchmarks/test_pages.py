@@ -80,7 +80,8 @@ def test_what_the_page_of_objects_promises():
     for name, one in seen.items():
         assert one["digest"] == digest_of(ObjectRegistry.load(name)), name
         assert max(one["drift"].values()) < 1.0, name  # mm
-        assert max(held for held, _ in one["grasps"].values()) >= 20, name
+        if ObjectRegistry.load(name).grasps:
+            assert max(held for held, _ in one["grasps"].values()) >= 20, name
 
 
 def test_what_the_page_of_placing_promises():

@@ -20,7 +20,6 @@ import sapien
 from sapien.physx import PhysxMaterial
 from sapien.wrapper.articulation_builder import ArticulationBuilder
 
-from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.simulation.sapien3.light_meshes import light_parts
 from robot_layouts.simulation.world import Visuals
 from robots import AssetError, GripperMaterial
@@ -100,18 +99,13 @@ def joint_frame(axis: Vector3, at: Vector3 = (0.0, 0.0, 0.0)) -> sapien.Pose:
     """Return the pose of a joint in a link, along or about whose x axis SAPIEN moves it.
 
     Args:
-        axis: Of the joint, in the link's frame.
+        axis: Of the joint, in the link's frame; a fixed one may have any.
         at: A point on it (m).
     """
-    return _pose(_frame_along(axis), at)
-
-
-def _frame_along(axis: Vector3) -> Floats:
-    """Return axes, as columns, the first of which is that of a joint."""
-    x = np.array(axis if any(axis) else (1.0, 0.0, 0.0))  # a fixed joint may have any
+    x = np.array(axis if any(axis) else (1.0, 0.0, 0.0))
     y = np.cross(x, (0.0, 0.0, 1.0) if abs(x[0]) > 0.9 else (1.0, 0.0, 0.0))
     y /= np.linalg.norm(y)
-    return np.column_stack([x, y, np.cross(x, y)])
+    return _pose(np.column_stack([x, y, np.cross(x, y)]), at)
 
 
 def _set_inertia(link: Any, inertia: LinkInertia, text: Element) -> None:

@@ -127,7 +127,8 @@ class BuiltWorld:
         built, *parts = build_bodies(self.scene, body, visuals=bool(self.visuals))
         if body.scale != 1.0:
             built.start_pose = _on_its_place(body, built.component, built.start_pose)
-        self.bodies.update((each.declared.name, each) for each in (built, *parts))
+        for each in (built, *parts):
+            self.bodies[each.declared.name] = each
         return built
 
     def settle(self) -> None:
