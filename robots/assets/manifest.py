@@ -153,12 +153,11 @@ class AssetManifest:
         return cls({name: _package_from_json(name, about) for name, about in packages.items()})
 
 
-@lru_cache(maxsize=1)
-def load_manifest() -> AssetManifest:
-    """Return the manifest of this checkout, or of this installation.
+def manifest_path() -> Path:
+    """Return the file of the manifest of this checkout, or of this installation.
 
     Raises:
-        AssetError: If there is none, or it is damaged.
+        AssetError: If there is none.
     """
     checkout = CHECKOUT_CACHE / "manifest.json"
     installed = Path(str(resources.files("robots").joinpath("manifest.json")))
@@ -168,6 +167,17 @@ def load_manifest() -> AssetManifest:
             f"no manifest of robot files: neither {checkout} nor {installed} exists; install"
             " robot-layouts again"
         )
+    return path
+
+
+@lru_cache(maxsize=1)
+def load_manifest() -> AssetManifest:
+    """Return the manifest of robot files.
+
+    Raises:
+        AssetError: If there is none, or it is damaged.
+    """
+    path = manifest_path()
     try:
         return AssetManifest.from_json(read_text(path, _LARGEST_MANIFEST))
     except UnreadableFileError as error:

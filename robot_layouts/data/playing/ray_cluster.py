@@ -25,7 +25,7 @@ from robot_layouts.core.portable import inherited_variables
 from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import is_installed
 from robots import MissingPackageError, TaskError, UnknownNameError
-from robots.assets.manifest import load_manifest
+from robots.assets.manifest import manifest_path
 
 _CONNECT_SECONDS = 10.0  # that a port may take to accept
 _JOIN_SECONDS = 60.0  # that all of joining may take, the import of Ray included
@@ -288,7 +288,7 @@ def gather_code(folder: Path, modules: Iterable[str] = ()) -> None:
             shutil.copytree(path, folder / name, ignore=_CACHES, dirs_exist_ok=True)
         if not spec.submodule_search_locations and spec.origin is not None:
             shutil.copy(spec.origin, folder)
-    (folder / "robots" / "manifest.json").write_text(load_manifest().to_json(), encoding="utf-8")
+    shutil.copy(manifest_path(), folder / "robots" / "manifest.json")
 
 
 def is_own(module: str) -> bool:
