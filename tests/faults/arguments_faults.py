@@ -37,7 +37,6 @@ WRONG_FIELDS: dict[str, tuple[Any, ...]] = {
         {"mount": ("arm", 5)},
     )
     + (
-        {"mount": ("arm", "palm")},
         {"shader_pack": 5},
         {"shader_pack": ["rt"]},
         {"base_camera": {5: 1}},
@@ -111,6 +110,8 @@ def faults() -> Iterator[Fault]:
             yield Fault(AREA, f"make({_call(name, value)})", partial(_make, {name: value}))
     for task_id in (None, 5, "", "PickCub-v1", b"PickCube-v1", ["PickCube-v1"], "\0", "../x:Y"):
         yield Fault(AREA, f"make: task {task_id!r}", partial(_make, {"task_id": task_id}))
+    mounted = {"sensor_configs": {"mount": ("arm", "palm")}, "obs_mode": "rgb"}
+    yield Fault(AREA, "make: a camera on a link that is not there", partial(_make, mounted))
     yield Fault(AREA, "make: two robots without places", _make_two)
     for kind, wrong in (("PhysicsSettings", WRONG_PHYSICS), ("Friction", WRONG_FRICTION)):
         for name, values in wrong.items():

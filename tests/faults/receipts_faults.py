@@ -185,7 +185,7 @@ def _both(*edits: Callable[[Any], object]) -> Callable[[Any], None]:
 
 # Every field, with one value of another kind.
 _FIELDS: dict[Place, Any] = {
-    ("format",): "robot-layouts receipt 2",
+    ("format",): "robot-layouts receipt 3",
     ("hash",): "ab",
     ("task",): [],
     ("task", "id"): ["PushT-v1"],

@@ -14,6 +14,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Generator
 from concurrent.futures import Future, wait
 from contextlib import ExitStack, contextmanager, suppress
@@ -32,6 +33,7 @@ SERVER_OF = "ROBOT_LAYOUTS_SERVER_OF"  # variable of the server: the process tha
 PRELOAD = "ROBOT_LAYOUTS_PRELOAD"  # likewise: the modules that it loads
 
 _PR_SET_PDEATHSIG = 1  # of Linux's prctl
+_PAUSES = (0.02, 0.1, 0.5)  # s; after each a server is asked again that was about to end
 _DESCRIPTORS = 12  # that starting a process takes for a moment, and the server as well
 _WHAT_RAN_OUT = {
     errno.EMFILE: "; each takes three file descriptors: raise `ulimit -n` or take fewer",
@@ -135,20 +137,24 @@ def _start(work: Callable[..., None], arguments: tuple[Any, ...], with_main: boo
         _server_is_inherited = False
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["robot_layouts.core.processes.server"])
-    with _server_environment():
-        forkserver.ensure_running()
     process = context.Process(
         target=_begin,
         args=(dict(os.environ), os.sched_getaffinity(0), work, arguments),
         daemon=True,
     )
-    try:
-        with _lock, _able_to_start(with_main):
-            process.start()
-    except EOFError:
-        raise ProcessError(
-            "the process that forks workers ended, for the reason that it printed"
-        ) from None
+    for pause in (*_PAUSES, None):
+        with _server_environment():
+            forkserver.ensure_running()
+        try:
+            with _lock, _able_to_start(with_main):
+                process.start()
+            break
+        except (EOFError, ConnectionError):
+            if pause is None:
+                raise ProcessError(
+                    "the process that forks workers ended, for the reason that it printed"
+                ) from None
+            time.sleep(pause)
     return process
 
 
