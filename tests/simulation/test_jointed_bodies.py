@@ -120,3 +120,20 @@ def test_parts_are_where_the_joints_of_a_thing_say(name):
         seen = state.pose(f"it.{joint}").astype(float)
         assert np.abs(seen[:, :3] - poses[:, :3]).max() < 1e-6
         assert np.abs(np.abs((seen[:, 3:] * poses[:, 3:]).sum(1)) - 1).max() < 1e-6
+
+
+def test_a_part_that_another_joint_carries_goes_with_it():
+    beyond = Box((0.1, 0.01, 0.01), position=(0.3, 0.0, 0.0))
+    arm = turn(axis=(0.0, 0.0, 1.0))
+    wrist = turn(name="wrist", parts=(beyond,), at=(0.2, 0.0, 0.0), carrier="arm")
+    simulation = jointed(arm, wrist)
+    simulation.worlds[0].set_joints("post", arm=0.7, wrist=-0.6)
+    for steps in (0, 5):
+        state = wait(simulation, steps)
+        joints = state.body_joints("post")[:, :2]
+        found = part_poses((arm, wrist), state.pose("post"), joints)
+        for name, poses in found.items():
+            seen = state.pose(f"post.{name}").astype(float)
+            assert np.abs(seen[:, :3] - poses[:, :3]).max() < 1e-6
+            assert np.abs(np.abs((seen[:, 3:] * poses[:, 3:]).sum(1)) - 1).max() < 1e-6
+    assert joints[0, 1] != pytest.approx(-0.6, abs=0.01)  # it fell
