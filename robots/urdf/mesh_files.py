@@ -38,6 +38,19 @@ _REFERENCES: Mapping[str, re.Pattern[bytes]] = {
     ".gltf": _URI,
 }
 
+_PLY_HEADER = re.compile(
+    rb"""ply[ \t]*\r?\n
+    (?:(?:comment|obj_info)[^\r\n]*\r?\n)*
+    format[ \t]+(?:ascii|binary_little_endian|binary_big_endian)[ \t]+1\.0[ \t]*\r?\n
+    (?:(?:(?:comment|obj_info)[^\r\n]*
+        |element[ \t]+\w+[ \t]+\d+
+        |property[ \t]+(?:list[ \t]+TYPE[ \t]+)?TYPE[ \t]+\w+)[ \t]*\r?\n)+
+    end_header[ \t]*\r?\n""".replace(
+        b"TYPE", rb"(?:u?char|u?short|u?int|float|double|u?int(?:8|16|32)|float(?:32|64))"
+    ),
+    re.VERBOSE,
+)
+
 Floats = Any
 """An array of float64."""
 
@@ -74,6 +87,8 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
     try:
         if ending == ".dae":
             parse_xml(contents, "it", "Collada")
+        if ending == ".ply":
+            _expect_ply(contents)
         stream = trimesh.util.wrap_as_stream(contents)
         scene = trimesh.load_scene(stream, file_type=ending[1:], resolver=beside, **options)
         broken = [_problem(mesh) for mesh in scene.geometry.values()]
@@ -82,6 +97,18 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
     if any(broken):
         raise AssetError(f"{where}: the mesh {path} has {next(filter(None, broken))}")
     return scene
+
+
+def _expect_ply(contents: bytes) -> None:
+    """Refuse a header with which SAPIEN's reader crashes, though trimesh's reads on.
+
+    Raises:
+        ValueError: If it is none of PLY 1.0, or describes an element twice.
+    """
+    header = _PLY_HEADER.match(contents)
+    elements = re.findall(rb"\nelement[ \t]+(\w+)", header[0]) if header else []
+    if len(set(elements)) != len(elements) or not elements:
+        raise ValueError("its header is not that of a PLY file of version 1.0")
 
 
 def _problem(mesh: Any) -> str:
@@ -93,6 +120,12 @@ def _problem(mesh: Any) -> str:
     faces = np.asarray(getattr(mesh, "faces", ()))
     if faces.size and not (0 <= faces.min() and faces.max() < len(mesh.vertices)):
         return f"faces between more than its {len(mesh.vertices)} corners"
+    # trimesh takes all lists of a binary PLY file for as long as the first of them.
+    for element in mesh.metadata.get("_ply_raw", {}).values():
+        fields = element.get("data", ())
+        for name in getattr(getattr(fields, "dtype", None), "names", None) or ():
+            if fields[name].dtype.names and len(np.unique(fields[name]["f0"])) > 1:
+                return "faces that contradict the length of their list"
     return ""
 
 

@@ -130,8 +130,13 @@ def test_what_is_accepted_can_be_built(tmp_path):
     def urdfs(text):
         accepted.append({"toy.urdf": encoded(text)})
 
+    twice = good("ply").partition(b"oat y")[0] + good("ply")[3:]
+    uneven = good("ply")[:-13] + b"\x80" + good("ply")[-12:]
+
     @settings(BUILT, max_examples=2000)
     @given(MESH_KINDS)
+    @example(("ply", twice))
+    @example(("ply", uneven))
     def meshes(damaged):
         kind, data = damaged
         accepted.append({f"arm.{kind}": data, "toy.urdf": toy(mesh(f"arm.{kind}")).encode()})
