@@ -9,7 +9,7 @@ import ctypes
 import os
 from ctypes import POINTER, Structure, byref, c_char, c_char_p, c_uint8, c_uint32, c_void_p
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakSet
 
 from robots import SimulationError
@@ -21,6 +21,7 @@ _VULKAN = "libvulkan.so.1"
 _VERSION_1_2 = 1 << 22 | 2 << 12
 # Vulkan's numbers of these structures
 _APPLICATION, _INSTANCE, _PROPERTIES, _DRIVER = 0, 1, 1000059001, 1000196000
+_PROCESSOR = 4  # its number of that kind of device
 _LIMITS = 4096  # bytes, more than the limits take that stand behind a device's name
 
 _owner: int | None = None  # the process that drew first, here or in what this is a fork of
@@ -120,19 +121,36 @@ def describe_graphics(device: str) -> dict[str, str]:
         ``device``, ``driver`` (name and version, ``unknown`` if Vulkan does not tell), ``threads``
         that a software driver has, and the ``variables`` that it goes by.
     """
-    drivers = _drivers()
-    if device not in drivers and len(drivers) == 1:
-        (device,) = drivers  # SAPIEN calls it "cpu" where native ManiSkill chose it
+    device, driver = _named(device)
     return {
         "device": device,
-        "driver": drivers.get(device, "unknown"),
+        "driver": driver.name if driver else "unknown",
         "threads": os.environ.get("LP_NUM_THREADS") or str(os.cpu_count()),
         "variables": " ".join(f"{n}={os.environ[n]}" for n in _VARIABLES if n in os.environ),
     }
 
 
+def draws_in_software(device: str) -> bool:
+    """Tell whether a device, by its name, is the processor; one that Vulkan does not tell of is."""
+    _, driver = _named(device)
+    return driver is None or driver.software
+
+
+class _Driver(NamedTuple):
+    name: str
+    software: bool
+
+
+def _named(device: str) -> tuple[str, _Driver | None]:
+    """Return the name that Vulkan has for a device, and its driver."""
+    drivers = _drivers()
+    if device not in drivers and len(drivers) == 1:
+        (device,) = drivers  # SAPIEN calls it "cpu" where native ManiSkill chose it
+    return device, drivers.get(device)
+
+
 @cache
-def _drivers() -> dict[str, str]:
+def _drivers() -> dict[str, _Driver]:
     """Return the driver of each device by the device's name."""
     try:
         vulkan = ctypes.CDLL(_VULKAN)
@@ -148,14 +166,15 @@ def _drivers() -> dict[str, str]:
         vulkan.vkEnumeratePhysicalDevices(instance, byref(count), None)
         devices = (c_void_p * count.value)()
         vulkan.vkEnumeratePhysicalDevices(instance, byref(count), devices)
-        found: dict[str, str] = {}
+        found: dict[str, _Driver] = {}
         for device in devices:
             driver = _VulkanDriver(type=_DRIVER)
             about = _VulkanDevice(type=_PROPERTIES, next=ctypes.cast(byref(driver), c_void_p))
             about_devices(c_void_p(device), byref(about))
             told = driver.info.decode(errors="replace") or f"{about.driver_version:#x}"
             name = driver.name.decode(errors="replace")
-            found[about.name.decode(errors="replace")] = f"{name}, {told}"
+            software = about.kind == _PROCESSOR
+            found[about.name.decode(errors="replace")] = _Driver(f"{name}, {told}", software)
         return found
     finally:
         vulkan.vkDestroyInstance(instance, None)

@@ -28,7 +28,7 @@ from robot_layouts.simulation.sapien3.backdrop import (
     DrawnBodies,
     planes,
 )
-from robot_layouts.simulation.sapien3.device import expect_render_device
+from robot_layouts.simulation.sapien3.device import draws_in_software, expect_render_device
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.scene.cameras import (
     RAW_IMAGES,
@@ -117,6 +117,7 @@ class Studio:
         self._cameras: dict[tuple[Any, ...], Any] = {}
         self._markers = _markers(world)
         self._bodies = DrawnBodies(world)
+        self._in_software = draws_in_software(world.scene.render_system.device.name)
         self._backdrops: dict[Any, Backdrop] = {}
         self._looks = AS_DECLARED  # that it has
         self._appearance: Appearance | None = None
@@ -134,7 +135,8 @@ class Studio:
             marker.visibility = float(markers)
         placed = [self._placed(name, camera, textures) for name, camera in cameras.items()]
         self._scene.update_render()
-        layered = all(shot.shaders == LAYERED for shot in placed)
+        # A graphics card draws everything sooner than backdrops are laid behind what moves.
+        layered = self._in_software and all(shot.shaders == LAYERED for shot in placed)
         if markers or not layered or not self._bodies.solid or self._world.shadows:
             return self._whole(placed)
         return self._layered(placed)
