@@ -23,6 +23,7 @@ HAND_OVER = 7 / 8
 # middle. Pandas need 0.93 to start 5 cm apart there, with joint noise.
 ROUND_CORNERS = 15 / 16
 UNEQUAL = 1 / 2  # of the larger reach; what counts as much less
+SHOULDER = 0.4  # of an arm's reach; how high its first joint is above the ground that it works on
 OPPOSITE = (("north", "south"), ("east", "west"))  # edges of a table
 
 Rows = Mapping[str, Sequence[RobotDescriptor]]  # the robots of each edge of a table, in order

@@ -5,16 +5,25 @@ whose own front is not its base's +x faces like the others.
 
 A distance given as ``"auto"`` comes from the robots' reach; see `layouts.distances`. Where it has
 to serve several pairs of neighbours, it is that of the pair that asks for the most. If a robot is
-not an arm of the catalogue, the layout is also checked as by `Layout.validate`, which reads the
-robots' files, and the robots are moved apart until none collide; if one collides with itself, that
-is an error. At a table of a given size no robot is moved: a task or `Layout.validate` checks it.
-Without python-fcl there is no such check, and the distance comes from reach alone.
+not an arm of the catalogue, or has wheels, the robots' files are read, and more is seen to:
+
+- A robot whose wheels or feet are lower than its base is raised by as much, and a driven torso
+  starts where its arm works on the ground.
+- Neighbours in a row or face to face are moved together until they share places near the
+  ground, with their grippers down, as two Pandas do.
+- As by `Layout.validate`, robots are moved apart until none collide. If one collides with itself,
+  that is an error.
+
+At a table of a given size no robot is moved: a task or `Layout.validate` checks it. Without
+python-fcl there is no such check, and the distance comes from reach alone.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from inspect import signature
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeGuard, cast
@@ -46,6 +55,11 @@ Distance = float | Literal["auto"]  # m
 FARTHEST = 3.0  # m; as much farther apart than by their reach robots stand at most
 
 ARM = 0.3  # m; what reaches less is a hand
+
+# Of the shorter reach: how deep within reach of neighbours the places lie that they share, how near
+# the ground they are, both as those of two Pandas; in which steps robots are moved together for
+# that, and by how much at most.
+ROOM, LOW, NEARER, CLOSEST = 0.14, 0.2, 0.05, 0.8
 
 EDGE = 0.1  # from a table's edge to a base's middle (m); native's single Pandas have 0.11 m
 
@@ -88,7 +102,11 @@ def side_by_side(
         )
 
     if _is_auto(spacing):
-        return _clear(loaded, lambda more: placed(centred(gaps(loaded.values(), more))))
+        return _clear(
+            loaded,
+            lambda more: placed(centred(gaps(loaded.values(), more))),
+            tuple(pairwise(loaded)),
+        )
     distance = _given("spacing", spacing)
     first = -distance * (len(loaded) - 1) / 2
     return placed([first + i * distance for i in range(len(loaded))])
@@ -115,7 +133,9 @@ def face_to_face(
         )
 
     if _is_auto(spacing):
-        return _clear(loaded, lambda more: placed(apart(*loaded.values()) + more))
+        return _clear(
+            loaded, lambda more: placed(apart(*loaded.values()) + more), tuple(pairwise(loaded))
+        )
     return placed(_given("spacing", spacing))
 
 
@@ -313,32 +333,81 @@ def _placed(
     return Placement(robot, position, faced(robot, yaw_quaternion(yaw)), keyframe)
 
 
-def _clear(robots: Mapping[str, RobotDescriptor], placed: Callable[[float], Layout]) -> Layout:
-    """Return a layout in which no robots collide, at the distances of reach if that suffices.
+def _clear(
+    robots: Mapping[str, RobotDescriptor],
+    placed: Callable[[float], Layout],
+    neighbours: Sequence[tuple[str, str]] = (),
+) -> Layout:
+    """Return a layout in which robots stand on the ground, share places, and do not collide.
 
-    Arms of the catalogue are not checked: their distances of reach suffice, as tests show.
+    Their distances are those of reach if that suffices. Arms of the catalogue are not looked at:
+    for them it does, as tests show.
 
     Args:
         robots: Robot by name.
         placed: Makes the layout, with distances that are so much larger than those of reach (m).
+        neighbours: Robots that are to reach the same places, by name.
 
     Raises:
         LayoutError: If there is none; says why.
     """
-    layout, more = placed(0.0), 0.0
-    if all(map(_is_known, robots.values())):
-        return layout
-    try:
-        while found := _problems(layout, "collision"):
-            more += max(finding.farther or FARTHEST for finding in found)
-            if more >= FARTHEST:
-                raise LayoutError(f"no distance keeps these robots apart\n{found[0]}")
-            layout = placed(more)
-        for finding in _problems(layout, "self-collision", "joint limit", "table", samples=0):
+    if not all(map(_is_known, robots.values())):
+        with suppress(AssetError, MissingPackageError):  # else their bodies are not known here
+            return _sound(placed, neighbours)
+    return placed(0.0)
+
+
+def _sound(placed: Callable[[float], Layout], neighbours: Sequence[tuple[str, str]]) -> Layout:
+    """See `_clear`."""
+    from layouts.ready import lift, stooped
+
+    starts = {name: stooped(placement) for name, placement in placed(0.0).items()}
+    lifts = {name: lift(placement) for name, placement in starts.items()}
+
+    def raised(more: float) -> Layout:
+        layout, places = placed(more), dict[str, Placement]()
+        for name, start in starts.items():
+            x, y, z = layout[name].local_pose.position
+            place = replace(layout[name], keyframe=start.keyframe, qpos=start.qpos)
+            places[name] = replace(place, position=(x, y, z + lifts[name]))
+        return Layout(places, layout.frames)
+
+    more = _more_to_share(raised, neighbours)
+    layout = raised(more)
+    while found := _problems(layout, "collision"):
+        more += max(finding.farther or FARTHEST for finding in found)
+        if more >= FARTHEST:
+            raise LayoutError(f"no distance keeps these robots apart\n{found[0]}")
+        layout = raised(more)
+    for finding in _problems(layout, "self-collision", "joint limit", "table", samples=0):
+        if not all(_in_catalogue(layout[name].robot) for name in finding.robots):
             raise LayoutError(f"no distance makes this layout sound\n{finding}")
-    except (AssetError, MissingPackageError):
-        pass  # their bodies are not known here
     return layout
+
+
+def _more_to_share(
+    placed: Callable[[float], Layout], neighbours: Sequence[tuple[str, str]]
+) -> float:
+    """Return by how much to change distances so that neighbours reach the same places (m).
+
+    That is 0, or negative; also 0 if they are never near enough for that.
+    """
+    from layouts.shared_place import shared_place
+
+    def share(layout: Layout, pair: tuple[str, str]) -> bool:
+        arms = [layout[name].robot for name in pair]
+        if any(arm.fingers is None or arm.limbs for arm in arms):
+            return True
+        shared = shared_place(layout, pair, height=LOW)
+        return shared is not None and shared[1] >= ROOM * min(arm.reach for arm in arms)
+
+    least = min(placement.robot.reach for placement in placed(0.0).values())
+    for nearer in range(round(CLOSEST / NEARER)):
+        more = -nearer * NEARER * least
+        layout = placed(more)
+        if all(share(layout, pair) for pair in neighbours):
+            return more
+    return 0.0
 
 
 def _problems(layout: Layout, *kinds: str, samples: int = 20) -> list[Finding]:
@@ -347,9 +416,15 @@ def _problems(layout: Layout, *kinds: str, samples: int = 20) -> list[Finding]:
 
 
 def _is_known(robot: RobotDescriptor) -> bool:
-    """Tell whether a robot is an arm of the catalogue; hands are as wide as they reach."""
-    known = robot.name in ROBOTS and RobotRegistry.load(robot.name) == robot
-    return known and robot.reach >= ARM
+    """Tell whether a robot is an arm of the catalogue that stands on its base.
+
+    Hands are as wide as they reach, and wheels may be lower than the base that they carry.
+    """
+    return _in_catalogue(robot) and robot.reach >= ARM and not robot.no_floor_contact
+
+
+def _in_catalogue(robot: RobotDescriptor) -> bool:
+    return robot.name in ROBOTS and RobotRegistry.load(robot.name) == robot
 
 
 def _is_auto(distance: object) -> TypeGuard[Literal["auto"]]:

@@ -1,12 +1,14 @@
-"""How a body stands ready: behind a table, hands above what they work on, grippers down."""
+"""How robots stand ready: on the ground or behind a table, hands above what they work on."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from layouts.distances import SHOULDER
 from layouts.frames import Rectangle
 from layouts.placement import LARGEST_NOISE, Placement
 from layouts.shared_place import (
@@ -16,14 +18,17 @@ from layouts.shared_place import (
     inside_table,
     places_and_approaches,
 )
-from layouts.validation.collisions import noisy_postures
+from layouts.validation.collisions import moving_hulls, noisy_postures
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, transform
 from robot_layouts.kinematics.solve import IkGoal, shortfalls, solve
-from robot_layouts.kinematics.tree import Tree
-from robots.gripper_motion import gripper_frame, link_tree
+from robot_layouts.kinematics.tree import FIXED, Tree
+from robots.bodies.hulls import load_model
+from robots.gripper_motion import aiming_joints, gripper_frame, link_tree
 from robots.urdf.tcp import find_tcp
 
 CLEARANCE, STEP = 0.02, 0.01  # m: from a body to the table; in which it is moved back
+POSTURES = 21  # of a torso that are looked at
+HIGHEST = 0.5  # of a reach, by which a robot is raised at most
 HEIGHT = 0.22  # of a reach: how high above the ground hands wait
 ASIDE = 0.15  # of a reach: how far aside from the middle of what is worked on, at least
 DOWN = 0.5  # of a reach, that a gripper is worth which points down instead of level
@@ -64,6 +69,64 @@ def made_ready(
                 placement = ready
                 break
     return placement
+
+
+def stooped(placement: Placement) -> Placement:
+    """Return the placement of a robot whose torso, if one is driven that slides, starts low enough.
+
+    Its arm begins `SHOULDER` of its reach above the robot's base, or as near to that as it
+    can. A robot without such a torso stays as it is.
+
+    Args:
+        placement: The robot, upright.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+    """
+    robot, tree = placement.robot, link_tree(placement.robot)
+    path = tree.path(find_tcp(robot, tree).turned)
+    drivers = [tree.coordinates[at] if at != FIXED else "" for at in tree.drivers]
+    aiming, qpos = aiming_joints(robot, robot), np.array(placement.start_qpos)
+    for joint in (drivers[link] for link in path if tree.slides[link]):
+        if joint not in robot.arm_joints or joint in aiming:
+            continue
+        shoulder = next(link for link in path if drivers[link] in aiming)
+        column = robot.joints.index(joint)
+        rows = np.tile(qpos, (POSTURES, 1))
+        low, high = np.clip(tree.limits[column], -robot.reach, robot.reach)
+        rows[1:, column] = np.linspace(low, high, POSTURES - 1)
+        heights = tree.forward(rows)[:, shoulder, 2, 3]
+        off = np.abs(heights - SHOULDER * robot.reach)
+        qpos = rows[np.argmin(off.round(3))]
+    if np.array_equal(qpos, placement.start_qpos):
+        return placement
+    return replace(placement, keyframe=None, qpos=qpos.tolist())
+
+
+def lift(placement: Placement) -> float:
+    """Return by how much a robot is to be raised so that nothing of it is in the ground (m).
+
+    The ground is level with its base; what is rigid with the base may go into it, as a pedestal
+    does. A robot that would stand too high to work there, on legs perhaps, is not raised at all.
+
+    Args:
+        placement: The robot, upright.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+    """
+    model = load_model(placement.robot)
+    noisier = replace(placement, qpos_noise=min(NOISIER * placement.qpos_noise, LARGEST_NOISE))
+    poses = model.kinematics.forward(noisy_postures(noisier, NOISES, np.random.default_rng(0)))
+    upright = pose_matrix((0.0, 0.0, 0.0), placement.local_pose.quaternion)
+    moving = [model.hulls[i] for i, _ in moving_hulls(model)]
+    corners = [
+        transform(upright @ row[hull.link], hull.corners) for row in poses for hull in moving
+    ]
+    lowest = min((points[:, 2].min() for points in corners), default=0.0)
+    if not -HIGHEST * placement.robot.reach < lowest < 0:
+        return 0.0
+    return math.floor(1.0 - 1e3 * lowest) / 1e3  # whole millimetres
 
 
 def off_the_table(

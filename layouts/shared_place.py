@@ -19,18 +19,21 @@ from robot_layouts.kinematics.tree import Tree
 from robots import MissingPackageError, RobotDescriptor
 from robots.bodies.hulls import load_model
 from robots.bodies.overlaps import overlapping
-from robots.gripper_motion import gripper_frame, home_of, link_tree
+from robots.gripper_motion import aiming_joints, gripper_frame, home_of, link_tree
 from robots.urdf.tcp import find_tcp
 
 _SAMPLES = 20_000  # random joint positions per arm
 _LEAST_DOWN = 0.3  # cosine between a gripper's approach and straight down
 _CELL = 0.05  # of the shorter reach: edge of the cells that places are counted in
-_HEIGHT = 0.35  # of the shorter reach: how high above the ground places are looked for
+HEIGHT = 0.35  # of the shorter reach: how high above the ground places are looked for
 _OFTEN = 3  # samples in a cell and its neighbours that show it to be well within reach
 
 
 def shared_place(
-    layout: Arrangement, places: Sequence[str], table: Rectangle | None = None
+    layout: Arrangement,
+    places: Sequence[str],
+    table: Rectangle | None = None,
+    height: float = HEIGHT,
 ) -> tuple[tuple[float, float], float] | None:
     """Return the place on the ground that lies deepest within reach of all arms, and how deep (m).
 
@@ -42,6 +45,7 @@ def shared_place(
         layout: The robots.
         places: The arms, by their names or places.
         table: Outline of the table that bodies work on, x_min, y_min, x_max, y_max (m).
+        height: How near the ground postures count, as a share of the shorter reach.
 
     Returns:
         None if no place is in reach of all of them.
@@ -51,7 +55,7 @@ def shared_place(
     """
     reach = min(layout.arm(place).robot.reach for place in places)
     cell = _CELL * reach
-    reached = [_near_ground(layout, place, _HEIGHT * reach, table) for place in places]
+    reached = [_near_ground(layout, place, height * reach, table) for place in places]
     everywhere = np.concatenate(reached) if all(map(len, reached)) else np.zeros((1, 2))
     low, high = everywhere.min(axis=0) - 2 * cell, everywhere.max(axis=0) + 2 * cell
     counts = np.ceil((high - low) / cell).astype(int)
@@ -72,13 +76,14 @@ def _near_ground(layout: Arrangement, place: str, height: float, table: Rectangl
     """Return where postures bring a TCP that is low and points down, (n, 2) (m, world)."""
     owner, arm = layout[layout.owner(place)], layout.arm(place).robot
     base = pose_matrix(owner.base_pose.position, owner.base_pose.quaternion)
-    points, approaches = places_and_approaches(owner.robot, arm)
+    body = body_joints(owner, arm)
+    points, approaches = places_and_approaches(owner.robot, arm, body)
     points, approaches = transform(base, points), approaches @ base[:3, :3].T
     low = (points[:, 2] > 0) & (points[:, 2] < height) & (approaches[:, 2] < -_LEAST_DOWN)
     if limb := layout.arm_name(place).partition(".")[2]:
         low &= _is_on(points, table)
         with suppress(MissingPackageError):  # all of them count then
-            low[low] = are_clear(owner, limb, drawn_postures(owner.robot, arm)[low], table)
+            low[low] = are_clear(owner, limb, drawn_postures(owner.robot, arm, body)[low], table)
     return points[low, :2]
 
 
@@ -157,19 +162,41 @@ def _is_on(points: Floats, table: Rectangle | None) -> NDArray[np.bool_]:
     return (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max)
 
 
-def drawn_postures(robot: RobotDescriptor, arm: RobotDescriptor) -> Floats:
-    """Return the random postures of an arm, (n, dof) (rad, m)."""
+def body_joints(placement: Placement, arm: RobotDescriptor) -> tuple[float, ...]:
+    """Return where joints start that are driven with an arm, but are not to aim it (rad, m)."""
+    robot, start = placement.robot, placement.start_qpos
+    return tuple(start[robot.joints.index(joint)] for joint in _of_body(robot, arm))
+
+
+def _of_body(robot: RobotDescriptor, arm: RobotDescriptor) -> list[str]:
+    return [joint for joint in arm.arm_joints if joint not in aiming_joints(robot, arm)]
+
+
+def drawn_postures(
+    robot: RobotDescriptor, arm: RobotDescriptor, body: tuple[float, ...] = ()
+) -> Floats:
+    """Return the random postures of an arm, (n, dof) (rad, m).
+
+    Args:
+        robot: The robot.
+        arm: The robot itself, or a limb of it.
+        body: See `body_joints`.
+    """
     tree = link_tree(robot)
-    columns = [robot.joints.index(joint) for joint in arm.arm_joints]
-    qpos = np.tile(home_of(robot, tree), (_SAMPLES, 1))
+    home = home_of(robot, tree)
+    home[[robot.joints.index(joint) for joint in _of_body(robot, arm)]] = body
+    columns = [robot.joints.index(joint) for joint in aiming_joints(robot, arm)]
+    qpos = np.tile(home, (_SAMPLES, 1))
     qpos[:, columns] = scattered(tree.limits[columns], _SAMPLES)
     return qpos
 
 
 @lru_cache(maxsize=32)
-def places_and_approaches(robot: RobotDescriptor, arm: RobotDescriptor) -> tuple[Floats, Floats]:
+def places_and_approaches(
+    robot: RobotDescriptor, arm: RobotDescriptor, body: tuple[float, ...] = ()
+) -> tuple[Floats, Floats]:
     """Return places and approaches of an arm's gripper in random postures, (n, 3) each, root."""
-    qpos, tree = drawn_postures(robot, arm), link_tree(robot)
+    qpos, tree = drawn_postures(robot, arm, body), link_tree(robot)
     tree = tree.towards(find_tcp(arm, tree).needed)
     tcp, poses = find_tcp(arm, tree), tree.forward(qpos)
     return tcp.places(poses), poses[:, tcp.turned, :3, :3] @ gripper_frame(arm)[:, 2]

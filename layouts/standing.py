@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from layouts.distances import SHOULDER
 from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
@@ -23,7 +24,6 @@ from robots import (
 # Shares of a reach at which what is worked on lies ahead. A Panda of ManiSkill stands 0.615 m, or
 # 0.72 of its reach, behind the middle of its table; two arms of one body reach over all of it.
 ALONE, BODY = 0.72, 0.6
-SHOULDER = 0.4  # of a limb's reach; how high its first joint is above where arms of the task stand
 Point = tuple[float, float]
 
 NAME = "robot"  # of the place of one robot that serves all roles

@@ -12,7 +12,7 @@ import numpy as np
 
 from robot_layouts.core.errors import DescriptorError
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
-from robot_layouts.kinematics.tree import Tree
+from robot_layouts.kinematics.tree import FIXED, Tree
 from robots.action_split import JointGroup, is_gripper
 from robots.descriptor import RobotDescriptor
 from robots.urdf.model import UrdfModel
@@ -254,6 +254,28 @@ def home_of(robot: RobotDescriptor, tree: Tree) -> Floats:
     """Return the coordinates of a `gripper_tree` at home, other limbs' at 0 (rad, m)."""
     qpos = np.array(robot.keyframe(robot.home.keyframe), float)
     return np.pad(qpos, (0, len(tree.coordinates) - len(qpos)))
+
+
+@lru_cache(maxsize=64)
+def aiming_joints(robot: RobotDescriptor, arm: RobotDescriptor) -> tuple[str, ...]:
+    """Return those of an arm's joints that are to bring its hand somewhere.
+
+    They carry the hand, and nothing else that moves with the arm: not a head, nor a torso with it.
+
+    Args:
+        robot: The robot.
+        arm: The robot itself, or a limb of it.
+
+    Raises:
+        AssetError: If its files cannot be found.
+    """
+    tree = link_tree(robot)
+    drivers = [tree.coordinates[at] if at != FIXED else "" for at in tree.drivers]
+    own = [drivers[link] for link in tree.path(find_tcp(arm, tree).turned)]
+    beside = [i for i, at in enumerate(drivers) if at in arm.arm_joints and at not in own]
+    shared = {drivers[link] for end in beside for link in tree.path(end)}
+    carrying = [joint for joint in arm.arm_joints if joint in own]
+    return tuple([joint for joint in carrying if joint not in shared] or carrying)
 
 
 def tips(tree: Tree, robot: RobotDescriptor, qpos: Floats) -> Floats:

@@ -24,7 +24,7 @@ from robot_layouts.simulation.checks.closing import Closing
 from robot_layouts.simulation.checks.trial import NAME
 from robots import RobotDescriptor
 from robots.action_split import is_gripper
-from robots.gripper_motion import gripper_motion, link_tree
+from robots.gripper_motion import aiming_joints, gripper_motion, link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 
@@ -38,6 +38,7 @@ RANDOM_STARTS = 3
 QUICK = 2.0  # times that quick drives nearly settle in a control step
 WIDER = (1.45, 2.0)  # than a cube a gripper is open before it closes
 ASIDE = (0.0, 0.25, -0.25, 0.5, -0.5)  # of its side: how far from the middle of the pads it may be
+FIRMNESSES = (1.0, 2.5)  # factors on the force with which a cube is held; the first that suffices
 SLIPS = 0.1  # of a cube's side that it may move in a hand that is shaken
 
 
@@ -75,11 +76,13 @@ class Grip:
             finger to finger, and its z axis about as the gripper points.
         share: How far the gripper is open before it closes.
         held: How far it is open when it holds the box.
+        firmness: Factor on the usual force with which it has to hold the box.
     """
 
     pose: Floats
     share: float
     held: float
+    firmness: float
 
 
 class Hand:
@@ -91,7 +94,8 @@ class Hand:
         motion: How its gripper moves.
         length: How far it reaches (m).
         quick: Whether its fingers are where they are driven to after each control step.
-        columns: Indices of the arm's joints among the robot's.
+        columns: Indices of the arm's joints among the robot's, those of a head or a torso that are
+            driven with it included.
         base: Pose of the robot's base in the world, (4, 4) (m).
     """
 
@@ -114,7 +118,8 @@ class Hand:
         whole = link_tree(robot)
         self._tree = whole.towards(find_tcp(own, whole).needed)
         self._tcp = find_tcp(own, self._tree)
-        few = len(self.columns) < FULL
+        self._aiming = [robot.joints.index(joint) for joint in aiming_joints(robot, own)]
+        few = len(self._aiming) < FULL
         self._turn, self._worth = (ROUGH_TURN, TURN_WORTH) if few else (TURN, 1.0)
         seconds = 1 / task.scenario.control_frequency
         self.quick = all(
@@ -122,20 +127,21 @@ class Hand:
             for name, group in own.action_split.groups.items()
             if is_gripper(name) and group.size
         )
-        self._random = scattered(self._tree.limits[self.columns], RANDOM_STARTS)
+        self._random = scattered(self._tree.limits[self._aiming], RANDOM_STARTS)
 
-    def grip(self, side: float, depth: float) -> Grip | None:
+    def grip(self, side: float, depth: float, firmness: float = 1.0) -> Grip | None:
         """Return how it holds a cube, as it was seen to in physics; None if it does not.
 
         Args:
             side: Of the cube (m).
             depth: How far before the middle of its pads the cube's middle is when they close, as a
                 share of its side.
+            firmness: Factor on the usual force with which it holds the cube.
 
         Raises:
             RobotLayoutsError: If the robot cannot be built.
         """
-        return _grip(self._robot, self._limb, round(side, 6), depth)
+        return _grip(self._robot, self._limb, round(side, 6), depth, firmness)
 
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""
@@ -198,7 +204,7 @@ class Hand:
         """
         if scatter:
             more = np.tile(starts[0], (RANDOM_STARTS, 1))
-            more[:, self.columns] = self._random
+            more[:, self._aiming] = self._random
             starts = np.concatenate([starts, more])
         n, s = len(places), len(starts)
         root = np.linalg.inv(self.base)
@@ -221,14 +227,14 @@ class Hand:
 
     def _descended(self, goal: IkGoal, rows: Floats, worth: float) -> Floats:
         """Bring rows of postures towards a goal; those that are far from it soon are left there."""
-        qpos = solve(self._tree, goal, rows, self.columns, FIRST_ITERATIONS, worth).qpos
+        qpos = solve(self._tree, goal, rows, self._aiming, FIRST_ITERATIONS, worth).qpos
         missing, turned = shortfalls(self._tree, goal, qpos)
         near = np.flatnonzero((missing < NEAR) & (turned < NEAR_TURN))
         if len(near):
             assert goal.rotation is not None
             some = replace(goal, position=goal.position[near], rotation=goal.rotation[near])
             rows = qpos[near]
-            qpos[near] = solve(self._tree, some, rows, self.columns, ITERATIONS, worth).qpos
+            qpos[near] = solve(self._tree, some, rows, self._aiming, ITERATIONS, worth).qpos
         return qpos
 
     def way(self, one: Floats, other: Floats) -> Floats:
@@ -237,7 +243,9 @@ class Hand:
 
 
 @lru_cache(maxsize=64)
-def _grip(robot: RobotDescriptor, limb: str, side: float, depth: float) -> Grip | None:
+def _grip(
+    robot: RobotDescriptor, limb: str, side: float, depth: float, firmness: float
+) -> Grip | None:
     """See `Hand.grip`; the limb is what its name adds to the robot's."""
     layout = single({NAME: robot})
     own, closing = layout.arm(NAME + limb).robot, Closing(layout, NAME + limb, side)
@@ -255,9 +263,9 @@ def _grip(robot: RobotDescriptor, limb: str, side: float, depth: float) -> Grip 
         place = cube[:3, 3], quaternion_of(cube[:3, :3])
         if not closing.has_room(qpos, place):
             continue
-        closed = closing.close(qpos, place)
+        closed = closing.close(qpos, place, firmness)
         if closed.held and closed.slipped < SLIPS * side:
-            return Grip(pose, share, closed.share)
+            return Grip(pose, share, closed.share, firmness)
     return None
 
 

@@ -75,6 +75,14 @@ def test_a_hand_shows_in_physics_how_it_holds_a_cube(robot: str):
     assert hand.grip(3 * hand.motion.widest, 0.2) is None
 
 
+def test_a_cube_that_slips_is_held_more_firmly():
+    hand = Hand(tasks.make(TASK, layout=face_to_face({"left": "z1", "right": "z1"})), "left")
+    assert hand.grip(0.025, 0.4) is None
+    firm = hand.grip(0.025, 0.4, firmness=2.5)
+    assert firm is not None
+    assert firm.firmness == 2.5
+
+
 def test_a_posture_of_an_arm_leaves_all_other_joints_where_they_are():
     env = tasks.make(TASK)
     hand, scene = Hand(env, "left"), Rehearsal(env).begin(0)

@@ -9,6 +9,7 @@ import pytest
 
 from layouts import Layout, around_table, face_to_face, grid, ring, side_by_side
 from layouts.distances import apart
+from layouts.shared_place import shared_place
 from robots import LayoutError, RobotDescriptor, RobotRegistry
 from tasks.originals.relay import find_zones
 from tests.layouts import small_robots
@@ -142,3 +143,38 @@ def test_without_fcl_the_distance_is_that_of_reach(tmp_path, monkeypatch):
 def test_hands_that_met_stand_clear():
     two = {"a": "allegro_hand_right", "b": "allegro_hand_left"}
     assert side_by_side(two, spacing="auto").validate(workspaces=False).ok
+
+
+def on_a_wheel(folder, height: float) -> RobotDescriptor:
+    """A small robot with a wheel whose middle is so high above its base (m), and 0.1 m large."""
+    wheel = small_robots.link("wheel", xyz=f"0 0 {height}")
+    parts = wheel + small_robots.joint("roll", "base", "wheel") + "</robot>"
+    text = small_robots.TURNTABLE.replace("</robot>", parts)
+    return small_robots.robot(folder, text, ["turn", "roll"])
+
+
+@pytest.mark.parametrize("way", [side_by_side, face_to_face, ring, grid, around_table])
+def test_a_robot_stands_on_its_wheels_beside_one_that_stands_on_its_base(way, tmp_path):
+    robots = {"left": on_a_wheel(tmp_path, 0.03), "right": "panda"}
+    layout = way(robots) if way in (ring, around_table) else way(robots, spacing="auto")
+    heights = [placement.local_pose.position[2] for placement in layout.values()]
+    assert heights == [pytest.approx(0.0205, abs=6e-4), 0.0]
+    assert not [f for f in layout.validate(workspaces=False, table=(-2.0, -2.0, 2.0, 2.0)).findings]
+
+
+def test_a_robot_on_high_legs_is_not_raised(tmp_path):
+    robots = {"left": on_a_wheel(tmp_path, -0.3), "right": "panda"}
+    assert side_by_side(robots, spacing="auto")["left"].base_position[2] == 0.0
+
+
+@pytest.mark.long
+def test_robots_of_tall_bodies_stoop_and_come_near_enough_to_work_together():
+    layout = face_to_face({"left": "fetch", "right": "fetch"})
+    robot = layout["left"].robot
+    assert layout["left"].start_qpos[robot.joints.index("torso_lift_joint")] == 0.0
+    assert layout["left"].base_position[2] == pytest.approx(0.005)
+    assert layout["right"].base_position[1] < apart(robot, robot) / 2
+    shared = shared_place(layout, ("left", "right"), height=0.2)
+    assert shared is not None
+    assert shared[1] > 0.14 * robot.reach
+    assert layout.validate(workspaces=False, table=(-2.0, -2.0, 2.0, 2.0)).ok

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robots import DescriptorError, RobotDescriptor, RobotRegistry
-from robots.gripper_motion import gripper_motion
+from robots.gripper_motion import aiming_joints, gripper_motion
 
 
 def load(name: str) -> RobotDescriptor:
@@ -75,3 +75,19 @@ def test_jaws_that_swing_are_turned_against_each_other_as_they_open():
     assert swinging.angles[0] < 1e-6
     assert swinging.angles[-1] > 1.5
     assert 0 < swinging.widest_within(0.1) < swinging.widest_within(0.3) < swinging.widest
+
+
+@pytest.mark.parametrize(
+    ("name", "limb", "others"),
+    [
+        ("panda", None, ()),
+        ("baxter", "left", ()),
+        ("fetch", None, ("head_pan_joint", "head_tilt_joint", "torso_lift_joint")),
+    ],
+)
+def test_a_head_and_the_torso_that_carries_it_do_not_aim_an_arm(
+    name: str, limb: str | None, others: tuple[str, ...]
+):
+    robot = RobotRegistry.load(name)
+    arm = robot.parts[limb] if limb else robot
+    assert set(arm.arm_joints) - set(aiming_joints(robot, arm)) == set(others)

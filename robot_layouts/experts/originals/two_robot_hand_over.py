@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from robot_layouts.experts.geometry import gripper_facing, heading
 from robot_layouts.experts.grasps import need_fingers
-from robot_layouts.experts.hands import Grip, Hand, HandPostures, between, box_grips, offsets
+from robot_layouts.experts.hands import (
+    FIRMNESSES,
+    Grip,
+    Hand,
+    HandPostures,
+    between,
+    box_grips,
+    offsets,
+)
 from robot_layouts.experts.rehearsal import Attempt, Rehearsal, search, tried
 from robot_layouts.experts.script import Scene, Script, Waypoint
 from robot_layouts.kinematics.rotations import (
@@ -221,15 +229,20 @@ class _Search:
     def _grips(self, hand: Hand, *depths: float) -> Iterator[tuple[Grip, float]]:
         """Yield how a hand holds the cube, at the depths at which it does, in their order.
 
+        It is held more firmly only if it would be lost at all of them.
+
         Raises:
             TaskError: If it does at none.
         """
         found = False
-        for depth in depths:
-            if (grip := hand.grip(self._edge, depth)) is not None:
-                found = True
-                yield grip, depth
-        if not found:
+        for firmness in FIRMNESSES:
+            for depth in depths:
+                if (grip := hand.grip(self._edge, depth, firmness)) is not None:
+                    found = True
+                    yield grip, depth
+            if found:
+                break
+        else:
             raise TaskError(
                 f"the gripper of {hand.arm!r} closes on a cube of {1e3 * self._edge:.3g} mm without"
                 " holding it; robot-layouts robots inspect ROBOT --try says how it grasps"
@@ -374,7 +387,7 @@ class _Search:
     def picking(self, pick: _Picking) -> tuple[Waypoint, ...]:
         """Return the giver's waypoints until it has lifted the cube."""
         cube_held = partial(Scene.grasps, robot=GIVER, body=CUBE)
-        share, force = pick.grip.share, self._force(self._giver)
+        share, force = pick.grip.share, self._force(self._giver, pick.grip)
         back, near = partial(self._off, pick), self._near(self._giver)
         length = self._fit.length(BACK)
         return (
@@ -397,7 +410,7 @@ class _Search:
                 Waypoint(
                     "present",
                     joints=partial(self._give, meeting),
-                    squeeze=self._force(self._giver),
+                    squeeze=self._force(self._giver, pick.grip),
                     near=self._near(self._giver),
                 ),
                 Waypoint("release", share=give_share, steps=3, after=("right.take",)),
@@ -421,36 +434,41 @@ class _Search:
                 Waypoint("take", squeeze=self._closing(self._taker), until=cube_taken, most=150),
                 Waypoint(
                     "hold",
-                    squeeze=self._force(self._taker),
+                    squeeze=self._force(self._taker, meeting.grip),
                     steps=4,
                     after=("left.release",),
                     until=cube_taken,
                     most=20,
                 ),
                 *(
-                    Waypoint(name, joints=self._carry, squeeze=self._force(self._taker), near=near)
+                    Waypoint(
+                        name,
+                        joints=self._carry,
+                        squeeze=self._force(self._taker, meeting.grip),
+                        near=near,
+                    )
                     for name, near in CARRIES
                 ),
                 # Of arms whose quick fingers press hard the joints' speeds do not come to 0.
-                Waypoint("place", joints=self._carry, squeeze=self._gentle()),
+                Waypoint("place", joints=self._carry, squeeze=self._gentle(meeting.grip)),
             ),
         }
 
-    def _force(self, hand: Hand) -> float:
+    def _force(self, hand: Hand, grip: Grip) -> float:
         """Return the force with which a hand holds the cube while it moves (N).
 
         Of what quick drives press with, little is left once they have settled.
         """
         share = hand.motion.share(self._edge)
-        gentle = self._gentle()
+        gentle = self._gentle(grip)
         return max(gentle, hand.motion.force(YIELD, share)) if hand.quick else gentle
 
-    def _gentle(self) -> float:
+    def _gentle(self, grip: Grip) -> float:
         """Return the force with which the cube is held at rest (N).
 
         It is in proportion to its weight: a light cube that is pressed harder slips out.
         """
-        return max(FORCE * self._fit.scale**3, LEAST_FORCE)
+        return grip.firmness * max(FORCE * self._fit.scale**3, LEAST_FORCE)
 
     def _near(self, hand: Hand) -> float:
         """Return how near a hand has to come to its place at the cube (rad)."""

@@ -72,23 +72,24 @@ class Closing:
         away = self._alone.simulation.read().position(CUBE)[0].astype(float) - place[0]
         return float(np.linalg.norm(away)) < _ROOM * self._side
 
-    def close(self, open_: Floats, place: tuple[Floats, Floats]) -> Closed:
+    def close(self, open_: Floats, place: tuple[Floats, Floats], firmness: float = 1.0) -> Closed:
         """Close on the cube, hold it, and shake it with the arm's first joint.
 
         Args:
             open_: All joints of the robot at first, (dof,) (rad, m).
             place: Where the cube floats then: its place, (3,) (m), and orientation, wxyz.
+            firmness: Factor on the force with which it is held.
         """
         self._begin(open_, place)
         alone, target = self._alone, open_.copy()
         for _ in range(_CLOSING):
-            target[self._gripper] = self._pressed()
+            target[self._gripper] = self._pressed(firmness)
             alone.step(alone.numbers_for(target))
         grasped, first, share = self._grasps(), self._in_hand(), self._share()
         slipped, grasps = 0.0, list[bool]()
         arm = [joint for joint in self._part.joints if joint in self._part.arm_joints][:1]
         for step in range(_HOLDING + _SHAKING):
-            target[self._gripper] = self._pressed()
+            target[self._gripper] = self._pressed(firmness)
             shaken = target.copy()
             for joint in arm:
                 turns = max(step - _HOLDING, 0) / _PERIOD
@@ -110,11 +111,11 @@ class Closing:
         now = self._alone.simulation.read().qpos(NAME)[0].astype(float)
         return self._motion.share_at(now[self._gripper])
 
-    def _pressed(self) -> Floats:
+    def _pressed(self, firmness: float) -> Floats:
         """Return where the gripper's joints are to go: to close, or to hold what they grasp."""
         share = self._share()
         closing = max(_CLOSE, self._motion.force(_STEP, self._motion.share(self._side)))
-        force = _HOLD if self._grasps() else closing
+        force = firmness * _HOLD if self._grasps() else closing
         return self._motion.positions(share - self._motion.pressing(force, share))
 
     def _grasps(self) -> bool:
