@@ -29,7 +29,7 @@ _BOX = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-
 
 
 class Triangles(NamedTuple):
-    """Triangles of the surface of a convex shape.
+    """Triangles of the surface of a shape.
 
     Attributes:
         corners: In the body's frame, (n, 3) (m).
@@ -261,7 +261,7 @@ def _surface(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
         case Box():
             return _BOX * shape.half_size, hull_triangles(tuple(map(tuple, _BOX.tolist())))
         case Mesh():
-            return _file(str(shape.file), shape.scale)
+            return _file(str(shape.file), shape.scale, shape.collides)
         case _:
             return _round(shape)
 
@@ -284,13 +284,13 @@ def _round(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
 
 
 @lru_cache(maxsize=64)
-def _file(file: str, scale: Place) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the convex hull of a mesh file, which is what collides of it."""
+def _file(file: str, scale: Place, collides: bool) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the surface of a mesh file; of one that collides its convex hull, which does so."""
     import trimesh
 
     try:
         loaded: Any = trimesh.load(file, force="mesh")
-        hull: Any = trimesh.convex.convex_hull(loaded)
+        found: Any = trimesh.convex.convex_hull(loaded) if collides else loaded
     except Exception as error:  # whatever the reader of this format raises
         raise DescriptorError(f"{file} cannot be read as a mesh: {error}") from error
-    return np.asarray(hull.vertices, float) * scale, np.asarray(hull.faces, np.intp)
+    return np.asarray(found.vertices, float) * scale, np.asarray(found.faces, np.intp)
