@@ -13,7 +13,7 @@ expect_own("robots")
 import os
 from typing import Any
 
-from objects.descriptor import ThingFromMesh, ThingFromMjcf, Grasp, NamedPoint, ObjectDescriptor
+from objects.descriptor import Grasp, NamedPoint, ObjectDescriptor, ThingFromMesh, ThingFromMjcf
 from objects.family import Family, Made, Size, family
 from objects.joints import Joint
 from objects.registry import ObjectRegistry

@@ -8,12 +8,15 @@ import numpy as np
 import pytest
 import trimesh
 
+import tasks
+from layouts import single
 from objects import ObjectDescriptor
 from objects.shapes import ConvexHull, Friction, Mesh
 from objects.solids import bounds, surface
 from robot_layouts.kinematics.rotations import rotate
 from robot_layouts.simulation.checks.objects import holding, try_rests
 from robots import AssetError, DescriptorError, MissingPackageError
+from tasks import Area, MultiRobotTask, Object, register_task
 
 
 @pytest.fixture(autouse=True)
@@ -190,3 +193,28 @@ def test_what_is_known_better_is_taken_over(tmp_path):
     assert (thing.name, thing.licence, thing.about) == ("hammer_of_mine", "CC0-1.0", "A mallet")
     assert thing.grasps == ()
     json.dumps(list(thing.rests.values()))
+
+
+def test_it_is_a_body_of_a_task_in_any_size(tmp_path, monkeypatch):
+    thing = ObjectDescriptor.from_mesh(mallet(tmp_path), density=400.0)
+    monkeypatch.delenv("ROBOT_LAYOUTS_ASSETS")  # which has the robot's files
+
+    class Look(MultiRobotTask):
+        """Leave a mallet where it is."""
+
+        layout = single({"arm": "panda"})
+        max_episode_steps = 5
+        mallet = Object(thing, scale=0.5, spawn=Area(x=0.0, y=0.3, yaw="any"))
+
+        def evaluate(self, state):
+            return {"success": state.position("mallet")[:, 2] > 1.0}
+
+    register_task("LookAtMallet-v1")(Look)
+    env = tasks.make("LookAtMallet-v1", num_envs=2)
+    env.reset(seed=0)
+    before = env.state.position("mallet").copy()
+    for _ in range(5):
+        env.step(env.action_space.sample() * 0)
+    assert np.abs(env.state.position("mallet") - before).max() < 1e-3
+    assert before[:, 2].tolist() == pytest.approx([0.0075, 0.0075], abs=1e-6)
+    env.close()
