@@ -130,7 +130,7 @@ def coffee_press(radius: float, height: float) -> Made:
     out = radius + 0.036  # the middle of the handle
     pull = loop((radius - 0.004, 0.0, height / 2), UP, FRONT, 0.04, 0.09, bar, PLASTIC)
     held = grips(
-        (out, 0.0, height / 2), UP, FRONT, bar, "body", offsets=(-0.015, 0.0, 0.015), tilts=LEAN
+        (out, 0.0, height / 2), UP, FRONT, bar, "body", offsets=(-0.015, 0.0, 0.015), pitches=LEAN
     )
     return Made(
         [

@@ -26,13 +26,8 @@ _APART = 0.01, np.cos(np.radians(25))  # m, and between ways: grasps nearer than
 _DIGITS = 9
 
 # A hand in its own frame (m): between its tips the origin, z its approach, y as fingers part.
-_FINGER = [
-    (x, y, z)
-    for x, y, z in product((-0.011, 0, 0.011), (0.002, 0.012), (-0.045, -0.03, -0.015, 0, 0.01))
-]
-_PALM = [
-    (x, y, z) for x, y, z in product((-0.025, 0, 0.025), (-1, -0.5, 0, 0.5, 1), (-0.065, -0.045))
-]
+_FINGER = [*product((-0.011, 0, 0.011), (0.002, 0.012), (-0.045, -0.03, -0.015, 0, 0.01))]
+_PALM = [*product((-0.025, 0, 0.025), (-1, -0.5, 0, 0.5, 1), (-0.065, -0.045))]
 
 
 class _Solid(NamedTuple):
