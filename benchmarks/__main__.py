@@ -10,6 +10,7 @@ from benchmarks.gallery.pages import gallery
 from benchmarks.learned import imitation, reinforcement
 from benchmarks.manifest import manifest
 from benchmarks.objects import objects
+from benchmarks.packaged import packaged
 from benchmarks.placing import placing
 from benchmarks.planning import planning
 from benchmarks.processors import processors
@@ -36,6 +37,7 @@ PROGRAM = Program(
             collisions,
             planning,
             placing,
+            packaged,
             objects,
             experts,
             conversions,

@@ -12,6 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from objects.packaged import PACKAGED
 from robot_layouts.core.errors import AssetError
 from robot_layouts.core.files import read_regular, read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
@@ -28,10 +29,12 @@ from robots.assets.manifest import (
 from robots.assets.packages import (
     INDEX_PACKAGES,
     MANI_SKILL,
+    OBJECT_PACKAGES,
     IndexPackage,
     SourceError,
     find_package,
 )
+from robots.mjcf.reading import files_of
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import UrdfReferences, read_references
 
@@ -47,6 +50,8 @@ TERMS = {
     " commercial use",
     "CC BY-NC-SA 4.0": "Creative Commons Attribution-NonCommercial-ShareAlike 4.0: name the"
     " authors, no commercial use, and share what you change under the same terms",
+    "MIT": "MIT licence: keep the copyright notice with the files",
+    "Zlib": "zlib licence: do not claim to be the author, and say so where you change the files",
     "MPL-2.0": "Mozilla Public License 2.0: what you change in the files stays under it",
 }
 
@@ -72,7 +77,7 @@ def manifest(*, check: bool = False) -> int:
 
 
 def build_manifest() -> AssetManifest:
-    """Return the manifest of everything that the catalogue's URDFs need, and of the scenery.
+    """Return the manifest of what the catalogue's URDFs need, of the scenery, and of objects.
 
     What is of an index package that is not installed is taken from the manifest that there is.
 
@@ -88,7 +93,8 @@ def build_manifest() -> AssetManifest:
             urdfs.setdefault(locator.package, set()).add(locator.file)
     packages = {name: _build_or_keep(name, urdfs[name]) for name in urdfs}
     scenes = build_scenery(find_package(MANI_SKILL.name))
-    return AssetManifest({**packages, scenery.PACKAGE: scenes})
+    things = {f"{package.prefix}objects": build_objects(package) for package in OBJECT_PACKAGES}
+    return AssetManifest({**packages, scenery.PACKAGE: scenes, **things})
 
 
 def to_json(manifest: AssetManifest) -> str:
@@ -98,7 +104,8 @@ def to_json(manifest: AssetManifest) -> str:
 
 
 def _package(package: AssetPackage) -> dict[str, Any]:
-    origin = {key: value for key, value in vars(package.origin).items() if key != "name" and value}
+    about = vars(package.origin).items()
+    origin = {key: value for key, value in about if key != "name" and value is not None}
     files = {
         file.path: {
             "bytes": file.bytes,
@@ -141,6 +148,47 @@ def build_scenery(installed: Path) -> AssetPackage:
     return AssetPackage(origin, tuple(_asset_file(origin, folder, p, set(), set()) for p in paths))
 
 
+def build_objects(package: IndexPackage) -> AssetPackage:
+    """Return the files of a package's objects; those of the manifest, if it is not installed.
+
+    Args:
+        package: The package.
+
+    Raises:
+        AssetError: If it is installed, and lacks one of the files.
+    """
+    name = f"{package.prefix}objects"
+    try:
+        installed = find_package(package.name)
+    except SourceError:
+        return load_manifest().package(name)
+    notice = next(
+        path.as_posix()
+        for path in metadata.files(package.name) or ()
+        if path.name in LICENCE_FILES and ".dist-info" in path.parts[0]
+    )
+    licence = _named_licence(read_text(installed / notice, LARGEST_FILE), readme=False)
+    origin = _origin(package, name, "", "object", (licence, TERMS[licence], notice))
+    needs: dict[str, set[str]] = {}
+    for thing in PACKAGED.values():
+        for number in range(thing.members) if thing.package == name else ():
+            file = thing.file.format(number)
+            for path in (file, notice, *_referred(installed, file)):
+                needs.setdefault(path, set()).add(file)
+    files = (
+        _asset_file(origin, installed, path, needed, set())
+        for path, needed in sorted(needs.items())
+    )
+    return AssetPackage(origin, tuple(files))
+
+
+def _referred(folder: Path, file: str) -> list[str]:
+    """Return what an MJCF refers to; a mesh is taken alone, and drawn in one colour."""
+    if not file.endswith(".xml"):
+        return []
+    return [used.relative_to(folder).as_posix() for used in files_of(folder / file)]
+
+
 def build_package(name: str, installed: Path, urdfs: set[str]) -> AssetPackage:
     """Return one package with everything that some of its URDFs need.
 
@@ -178,10 +226,11 @@ def build_package(name: str, installed: Path, urdfs: set[str]) -> AssetPackage:
 
 
 def _index_package(name: str) -> IndexPackage:
-    for package in INDEX_PACKAGES:
+    packages = [package for package in INDEX_PACKAGES if package.robots]
+    for package in packages:
         if name.startswith(package.prefix):
             return package
-    choices = " or ".join(f"{package.prefix}<folder>" for package in INDEX_PACKAGES)
+    choices = " or ".join(f"{package.prefix}<folder>" for package in packages)
     raise AssetError(f"package {name!r} is of no package on the index; call it {choices}")
 
 
@@ -232,6 +281,10 @@ def _named_licence(text: str, *, readme: bool) -> str:
         return (found[1] or found[2]) if found else ""
     if "Apache License Version 2.0," in " ".join(text.split()[:20]):  # after a copyright line
         return "Apache-2.0"
+    if "Permission is hereby granted, free of charge" in text:
+        return "MIT"
+    if "origin of this software must not be misrepresented" in text:
+        return "Zlib"
     return "BSD" if "Redistribution and use in source and binary forms" in text else ""
 
 

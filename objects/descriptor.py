@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated
+from typing import Annotated, Any, ClassVar, Protocol
 
 from objects.joints import Joint, checked_joints
-from objects.shapes import SIZED, Coordinate, Length, Place, Shape, scaled
+from objects.shapes import SIZED, Color, Coordinate, Friction, Length, Place, Shape, scaled
 from robot_layouts.core.bounds import checked_number, expect_unit
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robot_layouts.core.schema import check_fields, within
@@ -62,6 +63,97 @@ class Grasp:
         expect_unit("Grasp: quaternion", self.quaternion, DescriptorError)
 
 
+class ThingFromMesh(Protocol):
+    """The type of `ObjectDescriptor.from_mesh`."""
+
+    def __call__(
+        self,
+        path: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        scale: float = 1.0,
+        up: str | None = None,
+        mass: float | None = None,
+        density: float = 1000.0,
+        friction: Friction | None = None,
+        color: Color | None = None,
+        most_parts: int = 24,
+        **fields: Any,
+    ) -> ObjectDescriptor:
+        """Return a thing that looks as a mesh file says.
+
+        It collides with convex parts that fill the mesh, rests on the sides that are steady, and is
+        grasped where two of its sides face each other. All of that is worked out once, and kept in
+        the folder of the local copy of robot files. Whether grasps hold, physics tells:
+        `robot_layouts.simulation.checks.objects.holding`.
+
+        Args:
+            path: An OBJ, STL, PLY, DAE, GLB or glTF file.
+            name: Registry name; None takes that of the file.
+            scale: Factor on the file's lengths; 0.001 reads millimetres.
+            up: Which axis of the file points up: ``"x"``, ``"y"`` or ``"z"``; None takes y for GLB
+                and glTF, else z.
+            mass: What it weighs (kg); None goes by the density.
+            density: Of all of it (kg/m³).
+            friction: Contact material; None takes the world's.
+            color: Colour; None draws it as its file says.
+            most_parts: How many convex parts a hollow thing may be taken apart into; 1 takes the
+                convex hull of all, for which CoACD is not needed.
+            **fields: Fields of `ObjectDescriptor` that are known better, such as ``licence``,
+                ``points``, ``rests`` or ``grasps``.
+
+        Raises:
+            AssetError: If the file cannot be read.
+            DescriptorError: If it has no volume, is more than 5 m long, or an argument is out of
+                bounds.
+            MissingPackageError: If CoACD or SciPy is needed, and not installed:
+                ``pip install 'robot-layouts[objects]'``.
+            UnwritableFileError: If the local copy cannot be written.
+        """
+        ...
+
+
+class ThingFromMjcf(Protocol):
+    """The type of `ObjectDescriptor.from_mjcf`."""
+
+    def __call__(
+        self,
+        path: str | os.PathLike[str],
+        name: str | None = None,
+        *,
+        body: str | int | None = None,
+        mass: float | None = None,
+        folder: str | os.PathLike[str] | None = None,
+        **fields: Any,
+    ) -> ObjectDescriptor:
+        """Return a thing that is a body of an MJCF, with all that it carries.
+
+        MuJoCo compiles the file; what it makes of it is kept in the folder of the local copy of
+        robot files. Hinges and slides become joints, with their stops, damping and springs; those
+        of the body itself are left out, and so is dry friction, which MuJoCo means otherwise. Sites
+        become points. Of a mesh its convex hull collides, as in MuJoCo. Grasps are proposed as by
+        `from_mesh`: of a thing with joints, those of its moving parts.
+
+        Args:
+            path: An MJCF.
+            name: Registry name; None takes that of the body, or of the model.
+            body: Name of the body, or the number of one directly in the world, from 0 on; None
+                takes the only one that is.
+            mass: What all of it weighs (kg); None goes by the file.
+            folder: A folder whose files may be read, too.
+            **fields: Fields of `ObjectDescriptor` that are known better.
+
+        Raises:
+            AssetError: If a file cannot be read, or MuJoCo refuses it.
+            UnknownNameError: If it has no such body.
+            DescriptorError: If the body can be no thing: a part has several joints or a ball joint,
+                or nothing of it collides.
+            MissingPackageError: If MuJoCo or SciPy is needed, and not installed:
+                ``pip install 'robot-layouts[objects]'``.
+        """
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class ObjectDescriptor:
     """Everything the library knows about one thing; frozen, and checked when made.
@@ -94,6 +186,12 @@ class ObjectDescriptor:
     licence: str = "Apache-2.0"
     sizes: Mapping[str, Length] = field(default_factory=dict[str, Length])
     seed: int | None = None
+
+    # Bound in `objects`: what reads files is built on descriptors.
+    from_mesh: ClassVar[ThingFromMesh]
+    """Make a thing of a mesh file."""
+    from_mjcf: ClassVar[ThingFromMjcf]
+    """Make a thing of a body of an MJCF."""
 
     def __post_init__(self) -> None:
         """Freeze the mappings and refuse contradictions."""

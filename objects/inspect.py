@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from objects.descriptor import ObjectDescriptor
+from objects.packaged import PACKAGED
 from objects.registry import ObjectRegistry
 from objects.shapes import Mesh
 from robot_layouts.core.cli import Word
 from robot_layouts.core.commands import print_error, printable
 from robot_layouts.core.quoting import columns
 
-OBJECT = Word("OBJECT", about="a name that `robot-layouts objects list` prints")
+OBJECT = Word("OBJECT", about="a name that `robot-layouts objects list` prints, a mesh, or an MJCF")
 
 
 def list_objects() -> int:
-    """List the objects: size, mass, grasps, what they are.
+    """List the objects: size, mass, grasps, what they are; and those of packages, with licences.
 
     Exit code: 0, or 1 if an object of another package cannot be loaded.
     """
@@ -26,6 +27,9 @@ def list_objects() -> int:
         rests, count = ", ".join(thing.rests), str(len(thing.grasps))
         rows.append((thing.name, long, f"{thing.mass:.2g}", count, rests, thing.about))
     print(printable("\n".join(columns(rows))))
+    packages = [("made of files, which are fetched", "licence", "what it is")]
+    packages += [(name, one.licence, one.about) for name, one in sorted(PACKAGED.items())]
+    print(printable("\n".join(["", *columns(packages)])))
     for failure in failures:
         print_error(failure)
     return 1 if failures else 0

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from objects.descriptor import ObjectDescriptor
 from objects.inspect import OBJECT
+from objects.named import named_object
 from objects.registry import ObjectRegistry
 from objects.solids import surface
 from robot_layouts.core.cli import File, Seed
@@ -45,7 +46,7 @@ def show(
     """Draw objects side by side; it needs no graphics driver.
 
     Args:
-        objects: The objects (default: all).
+        objects: The objects (default: all that need no files of others).
         out: Picture to save (.png, .pdf, .svg).
         seed: Draws a member of each object's family (default: the usual ones).
         grasps: Draw a fork where a gripper holds an object, for each of its grasps.
@@ -53,7 +54,7 @@ def show(
     Raises:
         RobotLayoutsError: If an object does not exist, or the picture cannot be saved.
     """
-    things = [ObjectRegistry.load(name, seed) for name in objects or ObjectRegistry.names()]
+    things = [named_object(name, seed) for name in objects or ObjectRegistry.names()]
     print(f"picture: {save_sheet(things, out, grasps=grasps)}")
 
 

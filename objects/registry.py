@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from objects.descriptor import ObjectDescriptor
 from objects.family import Family
+from objects.packaged import PACKAGED, PackagedObject
 from robot_layouts.core.catalogue import Catalogue
 from robot_layouts.core.errors import DescriptorError, RobotLayoutsError
 from robot_layouts.core.quoting import shown
@@ -21,6 +22,10 @@ _FAMILIES = {
     ),
     "joining": ("bolt", "bracket", "gear", "nut", "outlet", "peg", "plug", "shaft", "socket"),
     "stock": ("beam", "board", "brick", "hammer", "screwdriver", "spoon"),
+    "two_handed": (
+        *("coffee_press", "drop_leaf_table", "interlock", "pepper_mill", "suitcase"),
+        *("two_hand_control", "wardrobe"),
+    ),
     "vessels": (
         *("bottle", "bottle_cap", "bowl", "can", "cup", "jug", "mug", "pan", "plate"),
         *("pot_lid", "pot_two_handles"),
@@ -68,7 +73,8 @@ class ObjectRegistry:
         """Return the thing registered under ``name``.
 
         Looks at what was registered in this process, then at the built-in families, then at the
-        entry points ``robot_layouts.objects`` of installed packages.
+        entry points ``robot_layouts.objects`` of installed packages. What `packaged` lists is made
+        of files, which are fetched if they are not in the local copy.
 
         Args:
             name: Its name.
@@ -78,8 +84,12 @@ class ObjectRegistry:
             UnknownNameError: If nothing has that name (also a ``KeyError``).
             DescriptorError: If it has no family that a seed could draw from, or another package
                 brings it, and that goes wrong.
+            AssetError: If no source has its files.
+            MissingPackageError: If its files need a package that is not installed.
         """
-        found = ObjectRegistry.family(name) if seed is not None else _found(name)
+        if isinstance(packaged := _found(name), PackagedObject):
+            return packaged.load(seed)
+        found = ObjectRegistry.family(name) if seed is not None else packaged
         if isinstance(found, ObjectDescriptor):
             return found
         return found.usual if seed is None else found.member(seed)
@@ -93,14 +103,19 @@ class ObjectRegistry:
             DescriptorError: If that is a single thing.
         """
         found = _found(name)
-        if isinstance(found, ObjectDescriptor):
+        if not isinstance(found, Family):
             raise DescriptorError(f"the object {name!r} is a single thing; it has no family")
         return found
 
     @staticmethod
     def names() -> tuple[str, ...]:
-        """Return every name, sorted."""
+        """Return the names of what needs no file of others, sorted."""
         return tuple(OBJECTS)
+
+    @staticmethod
+    def packaged() -> tuple[str, ...]:
+        """Return the names of what is made of files that packages on the index bring, sorted."""
+        return tuple(sorted(PACKAGED))
 
     @staticmethod
     def load_all() -> tuple[list[ObjectDescriptor], list[RobotLayoutsError]]:
@@ -117,11 +132,14 @@ class ObjectRegistry:
         Raises:
             DescriptorError: If it is neither, or another one has that name.
         """
-        OBJECTS.add(checked_object(thing, "register").name, thing)
+        name = checked_object(thing, "register").name
+        if name in PACKAGED:
+            raise DescriptorError(f"another object is already called {name!r}, of a package")
+        OBJECTS.add(name, thing)
         return thing
 
 
-def _found(name: str) -> ObjectDescriptor | Family:
+def _found(name: str) -> ObjectDescriptor | Family | PackagedObject:
     if not isinstance(name, str):
         raise OBJECTS.unknown(f"of type {type(name).__name__}", "It takes an object's name.")
-    return OBJECTS[name]
+    return PACKAGED[name] if name in PACKAGED else OBJECTS[name]

@@ -24,12 +24,13 @@ from robot_layouts.kinematics.rotations import (
 )
 
 SIDES = 32  # of the polygon that stands for a circle where a surface is wanted
+_WHOLE = 1e9  # nanometres are whole numbers
 _SAME_PLANE = 1e-7  # m; corners this near to a plane are in it
 _BOX = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
 class Triangles(NamedTuple):
-    """Triangles of the surface of a convex shape.
+    """Triangles of the surface of a shape.
 
     Attributes:
         corners: In the body's frame, (n, 3) (m).
@@ -183,9 +184,44 @@ def hull_triangles(corners: tuple[Place, ...]) -> NDArray[np.intp]:
         for ring in [_ring(points, members, normal)]
         for i in range(1, len(ring) - 1)
     ]
+    if not _is_closed(triangles):  # as where corners are so near to a plane that it is a guess
+        triangles = _exact_hull([[round(x * _WHOLE) for x in corner] for corner in corners])
     found = np.array(triangles, np.intp)
     found.setflags(write=False)
     return found
+
+
+def _is_closed(triangles: Sequence[Sequence[int]]) -> bool:
+    """Tell whether each edge of triangles is that of another one, the other way round."""
+    edges = [(t[i - 1], t[i]) for t in triangles for i in range(3)]
+    return len(set(edges)) == len(edges) and {(b, a) for a, b in edges} == set(edges)
+
+
+def _exact_hull(points: Sequence[Sequence[int]]) -> list[tuple[int, int, int]]:
+    """Return the surface of the convex hull of points, which whole numbers make exact.
+
+    It grows point by point: what a point sees of the surface is replaced by triangles to it.
+    """
+
+    def above(face: tuple[int, int, int], point: int) -> int:
+        (x, y, z), *others = (points[i] for i in (point, *face))
+        (a, b, c), (d, e, f), (g, h, i) = ((p - x, q - y, r - z) for p, q, r in others)
+        return a * (f * h - e * i) + b * (d * i - f * g) + c * (e * g - d * h)
+
+    count = len(points)
+    first = next(t for t in combinations(range(count), 4) if above((t[0], t[1], t[2]), t[3]))
+    one, two, three, four = (
+        first
+        if above((first[0], first[1], first[2]), first[3]) < 0
+        else (first[1], first[0], *first[2:])
+    )
+    faces = {(one, two, three), (two, one, four), (three, two, four), (one, three, four)}
+    for point in range(count):
+        seen = {face for face in faces if above(face, point) > 0}
+        edges = {(face[i - 1], face[i]) for face in seen for i in range(3)}
+        border = {(a, b) for a, b in edges if (b, a) not in edges}
+        faces = faces - seen | {(a, b, point) for a, b in border}
+    return sorted(faces)
 
 
 def _ring(points: Floats, members: tuple[int, ...], normal: Floats) -> list[int]:
@@ -261,7 +297,7 @@ def _surface(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
         case Box():
             return _BOX * shape.half_size, hull_triangles(tuple(map(tuple, _BOX.tolist())))
         case Mesh():
-            return _file(str(shape.file), shape.scale)
+            return _file(str(shape.file), shape.scale, shape.collides)
         case _:
             return _round(shape)
 
@@ -284,13 +320,13 @@ def _round(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
 
 
 @lru_cache(maxsize=64)
-def _file(file: str, scale: Place) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the convex hull of a mesh file, which is what collides of it."""
+def _file(file: str, scale: Place, collides: bool) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the surface of a mesh file; of one that collides its convex hull, which does so."""
     import trimesh
 
     try:
         loaded: Any = trimesh.load(file, force="mesh")
-        hull: Any = trimesh.convex.convex_hull(loaded)
+        found: Any = trimesh.convex.convex_hull(loaded) if collides else loaded
     except Exception as error:  # whatever the reader of this format raises
         raise DescriptorError(f"{file} cannot be read as a mesh: {error}") from error
-    return np.asarray(hull.vertices, float) * scale, np.asarray(hull.faces, np.intp)
+    return np.asarray(found.vertices, float) * scale, np.asarray(found.faces, np.intp)

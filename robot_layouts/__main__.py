@@ -48,6 +48,7 @@ _FOR_USERS = {
     "robots guess": "robots.from_urdf:print_guess",
     "objects list": "objects.inspect:list_objects",
     "objects inspect": "robot_layouts.simulation.checks.object_command:inspect",
+    "objects fetch": "objects.fetch:fetch",
     "objects show": "objects.picture:show",
     "new task": "tasks.new_task:new_task",
     "new robot": "robots.new_robot:new_robot",

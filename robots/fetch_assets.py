@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 from robot_layouts.core.cli import Word, main_of
@@ -21,7 +21,8 @@ from robots.descriptor import RobotDescriptor
 from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry
 
-SOURCES = ("local", "hf", *(package.name for package in INDEX_PACKAGES), "wheel")
+ROBOT_PACKAGES = [package for package in INDEX_PACKAGES if package.robots]
+SOURCES = ("local", "hf", *(package.name for package in ROBOT_PACKAGES), "wheel")
 ONLINE_SOURCES = ("hf", "wheel")
 
 
@@ -68,8 +69,8 @@ def fetch(
     if source and not robots:
         needs = {name: files for name, files in needs.items() if _holds_all(sources, files)}
     if not check:
-        ensure(_union(needs), store, sources)
-    code = _report(needs, store)
+        ensure(union(needs), store, sources)
+    code = print_files(needs, store)
     for failure in failures:
         print_error(failure)
     return 1 if failures else code
@@ -109,17 +110,28 @@ def _sources(
     chosen: dict[str, list[AssetSource]] = {
         "local": [LocalCopy(default_root())],
         "hf": [HubSource(revision=revision)],
-        "wheel": [PackageWheel(package) for package in INDEX_PACKAGES],
-        **{package.name: [InstalledPackage(package)] for package in INDEX_PACKAGES},
+        "wheel": [PackageWheel(package) for package in ROBOT_PACKAGES],
+        **{package.name: [InstalledPackage(package)] for package in ROBOT_PACKAGES},
     }
     return chosen[source]
 
 
-def _union(needs: dict[str, tuple[AssetFile, ...]]) -> list[AssetFile]:
+def union(needs: Mapping[str, Sequence[AssetFile]]) -> list[AssetFile]:
+    """Return all files that are needed, once each.
+
+    Args:
+        needs: Files by what needs them.
+    """
     return list(dict.fromkeys(file for files in needs.values() for file in files))
 
 
-def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
+def print_files(needs: Mapping[str, Sequence[AssetFile]], store: AssetStore) -> int:
+    """Print which files can be used, and under what licence; return 1 if some cannot, else 0.
+
+    Args:
+        needs: Files by what needs them.
+        store: Where they are.
+    """
     print(printable(f"robot files in {store.root}"))
     for robot, files in needs.items():
         bad = len(store.unusable(files))
@@ -127,7 +139,7 @@ def _report(needs: dict[str, tuple[AssetFile, ...]], store: AssetStore) -> int:
         print(
             f"  {robot}: " + (f"{bad} of {total} cannot be used" if bad else f"complete, {total}")
         )
-    files = _union(needs)
+    files = union(needs)
     for file in files:
         if store.state(file) is not FileState.VERIFIED:
             print(f"    {describe_file(file, store)}")

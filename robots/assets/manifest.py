@@ -24,7 +24,7 @@ class PackageOrigin:
 
     Attributes:
         name: Package name, also its folder in the cache.
-        folder: Its folder inside the wheel.
+        folder: Its folder inside the wheel; empty for all of it.
         wheel: Requirement whose wheel holds the files.
         licence: Short name of the licence.
         licence_note: What the licence asks for, in one sentence.

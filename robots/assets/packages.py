@@ -1,4 +1,4 @@
-"""Packages on the package index whose wheels hold robot files: data, and where one is installed."""
+"""Packages on the package index whose wheels hold files: data, and where one is installed."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ class SourceError(AssetError):
 
 @dataclass(frozen=True)
 class IndexPackage:
-    """A package on the package index whose wheel holds robot files.
+    """A package on the package index whose wheel holds files of robots or objects.
 
     Attributes:
         name: Name on the index, and of a source on the command line.
-        robots: Folder of its robots, one folder each, inside the wheel.
+        robots: Folder of its robots, one folder each, inside the wheel; empty if it has objects.
         prefix: What the names of packages of the manifest begin with that are its robots' folders.
         megabytes: Size of the wheel, roughly.
         hub_dataset: Hugging Face dataset that holds a copy of its files, if one does.
@@ -49,7 +49,11 @@ EXAMPLE_ROBOT_DATA = IndexPackage(
     megabytes=131,
     mount="example-robot-data/robots",
 )
-INDEX_PACKAGES = (MANI_SKILL, EXAMPLE_ROBOT_DATA)
+METAWORLD = IndexPackage("metaworld", robots="", prefix="metaworld_", megabytes=37)
+PYBULLET = IndexPackage("pybullet", robots="", prefix="pybullet_", megabytes=103)
+ROBOSUITE = IndexPackage("robosuite", robots="", prefix="robosuite_", megabytes=157)
+OBJECT_PACKAGES = (METAWORLD, PYBULLET, ROBOSUITE)
+INDEX_PACKAGES = (MANI_SKILL, EXAMPLE_ROBOT_DATA, *OBJECT_PACKAGES)
 
 
 def find_package(name: str) -> Path:

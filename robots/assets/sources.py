@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import posixpath
 import re
 import shutil
 import subprocess
@@ -320,7 +321,7 @@ def _unpack(wheel: Path, wanted: Sequence[AssetFile], beside: Sequence[AssetFile
     with archive:
         members = set(archive.namelist())
         for file in (*wanted, *beside):
-            member = f"{file.origin.folder}/{file.path}"
+            member = posixpath.join(file.origin.folder, file.path)
             if member in members:
                 yield file, _unpacked(archive, member, file)
             elif file in wanted:

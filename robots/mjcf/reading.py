@@ -89,6 +89,20 @@ def read_mjcf(path: Path) -> MjcfText:
     return _MjcfReading(path).text()
 
 
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return an MJCF, and all that it includes and refers to, as `read_mjcf` reads it.
+
+    Args:
+        path: Absolute path.
+
+    Raises:
+        AssetError: As `read_mjcf` does.
+    """
+    reading = _MjcfReading(path)
+    reading.text()
+    return reading.files
+
+
 class _MjcfReading:
     """One MJCF that is being read."""
 
@@ -98,6 +112,11 @@ class _MjcfReading:
         self._meshes: dict[str, bytes] = {}
         self._named: dict[str, str] = {}  # of meshes: path -> name in the text
         self._folders: dict[int, str] = {}  # of included elements that name a mesh, by identity
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What was read."""
+        return tuple(self._files)
 
     def text(self) -> MjcfText:
         root = self.expanded()

@@ -5,6 +5,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import ConvexHull as QhullsHull
 
 from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Sphere, scaled
@@ -105,3 +106,23 @@ def test_what_never_ends_has_no_surface(tmp_path):
         mass_of([Box((1, 1, 1), collides=False)])
     with pytest.raises(DescriptorError, match="no shape of this body collides, so that it rests"):
         lowest([], (1.0, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_corners_near_one_plane_make_a_surface_without_holes(seed):
+    """A bottom of 24 corners that are flat to a fifth of a micrometre, and a tip."""
+    random = np.random.default_rng(seed)
+    bottom = np.column_stack([random.uniform(-0.02, 0.02, (24, 2)), random.uniform(0, 2e-7, 24)])
+    corners = np.vstack([np.round(bottom, 8), [(0.0, 0.0, 0.03)]])
+    hull = tuple(map(tuple, corners.tolist()))
+    edges = Counter((t[i - 1], t[i]) for t in hull_triangles(hull).tolist() for i in range(3))
+    assert set(edges.values()) == {1}
+    assert {(b, a) for a, b in edges} == set(edges)
+    assert mass_of([ConvexHull(hull)]).volume == pytest.approx(QhullsHull(corners).volume)
+
+
+def test_a_mesh_that_does_not_collide_is_drawn_with_its_hole(tmp_path):
+    trimesh.creation.annulus(0.1, 0.2, 0.3).export(tmp_path / "ring.stl")
+    ring = surface(Mesh(tmp_path / "ring.stl", collides=False))
+    inside = np.hypot(ring.corners[:, 0], ring.corners[:, 1]) < 0.15
+    assert inside.any()

@@ -49,9 +49,17 @@ DUTIES = {
     "BSD": "keep the copyright notice",
     "BSD-3-Clause": "keep the copyright notice",
     "CC BY-NC-SA 4.0": "share what you change under the same terms",
+    "MIT": "keep the copyright notice",
+    "Zlib": "do not claim to be the author",
     "MPL-2.0": "what you change in the files stays under it",
 }
-WHEELS = {"maniskill_": "mani_skill==3.0.1", "example_": "example-robot-data==6.0.0"}
+WHEELS = {
+    "maniskill_": "mani_skill==3.0.1",
+    "example_": "example-robot-data==6.0.0",
+    "metaworld_": "metaworld==3.1.1",
+    "pybullet_": "pybullet==3.2.7",
+    "robosuite_": "robosuite==1.5.2",
+}
 APACHE = ("maniskill_koch", "maniskill_so100")
 
 
@@ -169,7 +177,7 @@ def test_the_tracked_manifest_is_sound():
         paths = [file.path for file in package.files]
         folders = {str(folder) for path in paths for folder in PurePosixPath(path).parents}
         assert paths == sorted(set(paths) - folders)
-        for path in (*paths, origin.folder, origin.hub_folder or "a", origin.mount or "a"):
+        for path in (*paths, origin.folder or "a", origin.hub_folder or "a", origin.mount or "a"):
             assert is_inside(path), path
         for file in package.files:
             assert type(file.bytes) is int

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Annotated
 
-from objects import ObjectDescriptor, ObjectRegistry
+from objects import ObjectDescriptor
 from objects.inspect import OBJECT, report
+from objects.named import named_object
 from robot_layouts.core.cli import Seed
 from robot_layouts.simulation.checks.objects import OPENINGS, try_rests, try_thing_grasps
 
@@ -30,7 +31,7 @@ def inspect(
     Raises:
         RobotLayoutsError: If an object does not exist, or cannot be built.
     """
-    things = [ObjectRegistry.load(name, seed) for name in objects]
+    things = [named_object(name, seed) for name in objects]
     problems = 0
     for thing in things:
         print(report(thing))

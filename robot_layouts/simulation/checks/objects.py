@@ -178,6 +178,24 @@ def try_thing_grasps(
         return _shaken(thing, hand, tried)
 
 
+def holding(thing: ObjectDescriptor, openings: Sequence[float] = OPENINGS) -> ObjectDescriptor:
+    """Return a thing with those of its grasps alone that hold it when they are tried.
+
+    Each is tried with all hands that open wide enough; see `try_thing_grasps`.
+
+    Args:
+        thing: The thing.
+        openings: How far the hands open (m).
+
+    Raises:
+        RobotLayoutsError: If it cannot be built.
+    """
+    tried = [one for opening in openings for one in try_thing_grasps(thing, opening)]
+    failed = {one.grasp for one in tried if not one.holds}
+    held = {one.grasp for one in tried} - failed
+    return replace(thing, grasps=tuple(grasp for grasp in thing.grasps if grasp in held))
+
+
 def _shaken(
     thing: ObjectDescriptor, hand: RobotDescriptor, grasps: Sequence[Grasp]
 ) -> list[TriedGrasp]:

@@ -1,0 +1,1 @@
+"""Things from files: meshes and MJCFs become convex parts, ways to rest, and places to grasp."""
