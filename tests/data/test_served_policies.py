@@ -101,6 +101,7 @@ def test_the_whole_of_a_chunk_is_carried_out_or_its_first_steps(chunks, tmp_path
 def test_recordings_and_receipts_name_the_server_without_its_secrets(leaning, tmp_path):
     secret = leaning.replace("://", "://me:secret@")
     folder = tmp_path / "recorded"
+    assert "secret" not in repr(ServedPolicy(secret))
     summary = record(TASK, [0], folder, workers=0, policy=secret, **SHORT)
     assert "policy server: 10 answers, median" in str(summary)
     with Recording(folder) as file:
@@ -153,9 +154,11 @@ def test_keys_say_what_is_sent_and_what_actions_become(two_arms, tmp_path):
     file.write_text(KEYS)
     keys = Keys(load_keys(file), two_arms)
     observation, _ = two_arms.reset(seed=3)
+    observation["agent"]["panda_wristcam-0"]["qpos"][0, 7:] = 0.01  # m, of 0.04
     sent = keys.sent(observation)
     qpos = [observation["agent"][f"panda_wristcam-{i}"]["qpos"][0].numpy() for i in range(2)]
     fingers = [1 - q[7:8] / np.float32(0.04) for q in qpos]
+    assert np.ravel(fingers) == pytest.approx([0.75, 0.0], abs=1e-6)
     expected = np.concatenate([qpos[0][:7], fingers[0], qpos[1][:7], fingers[1]])
     np.testing.assert_allclose(sent["observation/state"], expected, atol=1e-6)
     assert sent["observation/state"].dtype == np.float32

@@ -36,7 +36,7 @@ class ServedPolicy:
         keys: What that holds.
     """
 
-    address: str
+    address: str = field(repr=False)
     name: str = field(init=False)
     file: str | None = field(init=False, default=None)
     keys: Mapping[str, Any] | str | None = field(init=False, default=None)
