@@ -45,12 +45,14 @@ class Score:
         total: Sum of its rewards.
         steps: Its control steps.
         reason: Why it failed, in words, if that is known; of an expert, it is.
+        waits: How long each answer of its policy's server took (s); empty if none serves it.
     """
 
     success: bool
     total: float
     steps: int
     reason: str = field(default="", compare=False)
+    waits: tuple[float, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True)

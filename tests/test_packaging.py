@@ -122,6 +122,7 @@ class TestDependencies:
             "pettingzoo",
             "ray",
             "sb3",
+            "served",
             "usd",
             "xacro",
         ):

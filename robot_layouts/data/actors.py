@@ -1,4 +1,4 @@
-"""Who acts: policies by name, and what a recording keeps of experts, policies and people."""
+"""Who acts: what a recording keeps of experts, policies and people."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.core.importing import imported
 from robot_layouts.data.reading.json_files import sized_file
-from robots import RecordingError, TaskError, UnreadableFileError
+from robots import RecordingError, UnreadableFileError
 
 EXPERT = "expert"
 POLICY, PERSON = "policy", "person"
@@ -27,42 +26,6 @@ _BETWEEN = "; "  # sources in the latter
 Turns = NDArray[np.uint8]
 Source = tuple[str | None, str | None]
 """What a recording says of its source as a whole: ``source_type`` and ``source_desc``."""
-
-
-def find_policy(name: str, what: str = "policy") -> Any:
-    """Return what ``MODULE:NAME`` names, or the word ``"expert"`` as it is.
-
-    Args:
-        name: The name.
-        what: What is looked for, in a word that an error uses.
-
-    Raises:
-        TaskError: If it cannot be imported.
-    """
-    if name == EXPERT and what == "policy":
-        return name
-    module, _, attribute = name.partition(":")
-    if not module or not attribute:
-        word = f", or the word {EXPERT!r}" if what == "policy" else ""
-        raise TaskError(f"{what} is {name!r}; it must be MODULE:NAME, something callable{word}")
-    return check_policy(imported(name, what, TaskError), what)
-
-
-def check_policy(policy: Any, what: str = "policy") -> Any:
-    """Return what gives actions, or refuse what cannot.
-
-    Raises:
-        TaskError: If it is not callable, or a class.
-    """
-    if isinstance(policy, type):
-        raise TaskError(
-            f"{what} is the class {policy.__qualname__}; give an instance of it, such as"
-            f" {policy.__qualname__}()"
-        )
-    if not callable(policy):
-        word = f", or the word {EXPERT!r}" if what == "policy" else ""
-        raise TaskError(f"{what} is {policy!r}; it must be callable, obs → action{word}")
-    return policy
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ def teleop(
     import_viser()
 
     import tasks
-    from robot_layouts.data.actors import find_policy
+    from robot_layouts.data.playing.policies import find_policy
     from robot_layouts.data.reading.recording import FILE
     from robot_layouts.data.recording.recorder import Recorder
     from robot_layouts.data.teleop.page import serve

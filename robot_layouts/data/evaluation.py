@@ -14,9 +14,16 @@ from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.writing import writing_errors
 from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore, scores_of
-from robot_layouts.data.playing.executor import Executor, checked_seeds, choose_executor, seed_lines
+from robot_layouts.data.playing.executor import (
+    Executor,
+    checked_seeds,
+    choose_executor,
+    seed_lines,
+    wait_lines,
+)
 from robot_layouts.data.playing.picture_digests import WatchedPictures
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event
+from robot_layouts.data.playing.served.policy import ServedPolicy
 from robot_layouts.data.playing.together import Cast, cast_of, grouped
 from robot_layouts.data.receipts.pictures import keep, pictures_folder
 from robot_layouts.data.receipts.provenance import describe_job, receipt_of
@@ -70,6 +77,11 @@ class Evaluation:
         return {seed: score.reason for seed, score in self.scores.items() if score.reason}
 
     @property
+    def waits(self) -> tuple[float, ...]:
+        """How long each answer of the policy's server took (s); empty if none serves it."""
+        return tuple(wait for score in self.scores.values() for wait in score.waits)
+
+    @property
     def lengths(self) -> dict[int, int]:
         """Seed → control steps."""
         return {seed: score.steps for seed, score in self.scores.items()}
@@ -83,7 +95,7 @@ class Evaluation:
             "on average: return {:.2f} ({:.4g} to {:.4g})".format(*_spread(self.returns))
             + ", {:.1f} steps ({} to {})".format(*_spread(self.lengths)),
         ]
-        return "\n".join([*lines, *seed_lines("no success", failed)])
+        return "\n".join([*lines, *wait_lines(self.waits), *seed_lines("no success", failed)])
 
 
 def evaluate(
@@ -112,8 +124,10 @@ def evaluate(
         policy: Maps the observation, (1, D) float32 if ``obs_mode`` is ``"state"``, to the action,
             (A,) or (1, A). It can be pickled, unless ``workers`` is 0; what `copy.deepcopy` does
             not copy, such as a function, is not copied for each episode. Or where one is imported
-            from, ``"module:name"``. Or ``"expert"``, which makes a plan for each seed and carries
-            it out; where it finds none, the episode is a failure of 0 steps, whose reason is given.
+            from, ``"module:name"``. Or where one is served, ``"ws://host:port"``; see
+            `robot_layouts.data.playing.served.policy.ServedPolicy`. Or ``"expert"``, which makes a
+            plan for each seed and carries it out; where it finds none, the episode is a failure of
+            0 steps, whose reason is given.
         task: Id of the task, or an environment of it, as which every episode is made.
         seeds: Which episodes, each once.
         num_envs: How many episodes each process plays at once, in environments of one task. The
@@ -145,6 +159,8 @@ def evaluate(
         ReceiptError: If it needs files of the policy that cannot be read.
         WorkerError: If the policy raised something, cannot be sent to the workers, or they die of
             it again and again.
+        PolicyServerError: If the policy's server cannot be reached, is silent, or answers what is
+            no action.
     """
     executor = choose_executor(workers, executor, episode_timeout)
     seeds = checked_seeds(seeds)
@@ -178,7 +194,10 @@ def evaluate(
     found = scores_of(executor, job, write_pictures)
     written = receipt_of(described, job, {seed: found[seed] for seed in seeds})
     written.write(receipt)
-    scores = {e.seed: Score(e.success, e.total, e.steps, e.reason) for e in written.episodes}
+    scores = {
+        e.seed: Score(e.success, e.total, e.steps, e.reason, found[e.seed].waits)
+        for e in written.episodes
+    }
     return Evaluation(cls.task_id, _name(cast), scores, written)
 
 
@@ -195,6 +214,8 @@ def _name(cast: Cast) -> str:
     """Return who plays, in words."""
     if cast.expert is not None:
         return EXPERT
+    if isinstance(cast.policy, ServedPolicy):
+        return cast.policy.name
     return getattr(cast.policy, "__qualname__", type(cast.policy).__qualname__)
 
 

@@ -177,6 +177,8 @@ def evaluate(
     print(found)
     if found.receipt is not None:
         print(f"{receipt}: receipt {found.receipt.hash}")
+        if found.receipt.policy.get("served"):
+            print("it cannot be verified without the policy's server")
 
 
 def certify(

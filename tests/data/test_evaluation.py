@@ -170,7 +170,7 @@ def test_success_ends_an_episode():
         (still, TASK, 5, {}, TaskError, "seeds is 5; it takes a sequence of integers"),
         (still, TASK, [0.5], {}, TaskError, r"seeds is \[0.5\]; it takes a sequence of integers"),
         (still, TASK, [-1], {}, TaskError, r"seed -1 must lie from 0 to 2\*\*32 - 1"),
-        ("exprt", TASK, [0], {}, TaskError, "policy is 'exprt'; it must be MODULE:NAME, someth"),
+        ("exprt", TASK, [0], {}, TaskError, "policy is 'exprt'; it must be MODULE:NAME, ws://H"),
         (fails, TASK, [7], {}, WorkerError, "seed 7: KeyError: 'no such key' .*policies.py:"),
         (
             lambda obs: obs,

@@ -17,7 +17,7 @@ pytest.importorskip("matplotlib")
 
 import tasks
 from robot_layouts.data import evaluate
-from robot_layouts.data.actors import find_policy
+from robot_layouts.data.playing.policies import find_policy
 from robots import TaskError
 from tests.examples.learning import (
     assert_same,

@@ -7,9 +7,11 @@ import os
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
+from statistics import median
 from typing import Any, Protocol
 
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.pages import plural
 from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import packed
 from robot_layouts.core.processes.worker import Pool, Reply, Worker
@@ -211,3 +213,16 @@ def seed_lines(what: str, reasons: Mapping[int, str]) -> list[str]:
     named = f"seed{'s' * (len(reasons) > 1)} {', '.join(map(str, [*reasons][:_SHOWN]))}{more}"
     known = [f"seed {seed}: {reason}" for seed, reason in reasons.items() if reason]
     return [f"{what}: {named}", *known[:_SHOWN]]
+
+
+def wait_lines(waits: Sequence[float]) -> list[str]:
+    """Return a line that says how long a policy's server took for its answers (s), if it gave any.
+
+    Args:
+        waits: How long each took (s).
+    """
+    if not waits:
+        return []
+    middle, longest = 1e3 * median(waits), 1e3 * max(waits)
+    answers = plural(len(waits), "answer")
+    return [f"policy server: {answers}, median {middle:.1f} ms, longest {longest:.1f} ms"]

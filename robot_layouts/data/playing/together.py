@@ -17,10 +17,17 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from robot_layouts.data.actors import EXPERT, check_policy, find_policy, is_person
+from robot_layouts.data.actors import EXPERT, is_person
 from robot_layouts.data.playing.executor import modules_of
 from robot_layouts.data.playing.in_process import random_states, seed_all, set_random_states
 from robot_layouts.data.playing.mode_conversion import Planner
+from robot_layouts.data.playing.policies import (
+    check_policy,
+    close_served,
+    find_policy,
+    playing,
+    waits_of,
+)
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.registry import Expert
@@ -99,7 +106,8 @@ class EpisodePlayer:
             return self.rehearsed.score
         success = bool(self.moments) and self.moments[-1].success
         total = fsum(moment.reward for moment in self.moments)
-        return Score(success, total, len(self.moments), "" if success else self.reason)
+        reason = "" if success else self.reason
+        return Score(success, total, len(self.moments), reason, waits_of(self.policy))
 
     def episode(
         self, states: States, observations: Any, drawn: dict[str, Any] | None
@@ -376,6 +384,11 @@ class Cast:
         """All of them."""
         return self.policy, self.expert, self.takeover, self.corrector
 
+    def playing(self, task: TaskEnv) -> Cast:
+        """Return them as they act in a task; see `robot_layouts.data.playing.policies.playing`."""
+        names = ("policy", "takeover", "corrector")
+        return replace(self, **{name: playing(getattr(self, name), task) for name in names})
+
 
 def cast_of(policy: Policy | str, task: type[MultiRobotTask]) -> tuple[Cast, str | None]:
     """Return who plays, and by which name ``module:name`` that was imported, if it was.
@@ -403,7 +416,7 @@ class Casting:
             cast: Who may act.
             env: Where it is played; experts that plan leave it alone.
         """
-        self._cast, self._env = cast, env
+        self._cast, self._env = cast.playing(env), env
         self._own: TaskEnv | None = None
         self._planner: Planner | None = None
         if cast.expert is not None:
@@ -427,7 +440,9 @@ class Casting:
         )
 
     def close(self) -> None:
-        """Let the worlds of its own go."""
+        """Let the worlds of its own and the connections to servers go."""
+        for member in self._cast.members:
+            close_served(member)
         for own in (self._planner, self._own):
             if own is not None:
                 own.close()

@@ -26,6 +26,7 @@ from robot_layouts.core.own_packages import PACKAGES
 from robot_layouts.core.schema import FieldError, Finite, Name, Object, check, length, whole
 from robot_layouts.data.actors import EXPERT, POLICY, definition, name_of
 from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore
+from robot_layouts.data.playing.served.policy import ServedPolicy
 from robot_layouts.data.playing.together import is_batched
 from robot_layouts.data.reading.json_files import sized_file
 from robot_layouts.data.reading.provenance import (
@@ -272,6 +273,7 @@ def describe_policy(policy: Any, name: str | None = None) -> dict[str, Any]:
     the file of that module. In ``also`` is that of the module that defines its class, if that is
     another one; in ``files`` those of the files that it names by its attribute ``file`` or
     ``files``; in ``weights`` one over the tensors of each ``torch.nn.Module`` that it is or has.
+    Of a policy that is ``served``, only the address and the file of keys are known.
 
     Args:
         policy: What gives actions.
@@ -280,6 +282,9 @@ def describe_policy(policy: Any, name: str | None = None) -> dict[str, Any]:
     Raises:
         ReceiptError: If one of its files cannot be read.
     """
+    if isinstance(policy, ServedPolicy):
+        about = {"kind": POLICY, "name": policy.name, "sha256": None, "served": True}
+        return {**about, **_filled(files=_files(policy))}
     found = name or _importable_name(policy)
     module, defining = (found or name_of(policy)).partition(":")[0], definition(policy).__module__
     return {

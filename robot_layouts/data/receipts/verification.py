@@ -408,6 +408,11 @@ def _expect_policy(receipt: Receipt) -> None:
     kind, name = receipt.policy["kind"], receipt.policy["name"]
     if kind == EXPERT:
         return
+    if receipt.policy.get("served") is True:
+        raise ReceiptError(
+            f"the receipt is of a policy that {name} served, and nothing but that server can verify"
+            f" it; where it, or another that serves the same, runs, type: --policy {quote(name)}"
+        )
     if receipt.policy.get("importable") is not True:
         raise ReceiptError(
             f"the receipt's policy {name} was no variable of a module, and cannot be imported"

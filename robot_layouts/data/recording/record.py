@@ -23,10 +23,8 @@ from robot_layouts.data.actors import (
     TYPE,
     Actor,
     actor_of,
-    check_policy,
     combined,
     episode_source,
-    find_policy,
 )
 from robot_layouts.data.playing.executor import (
     Executor,
@@ -34,7 +32,9 @@ from robot_layouts.data.playing.executor import (
     choose_executor,
     play_all,
     seed_lines,
+    wait_lines,
 )
+from robot_layouts.data.playing.policies import check_policy, find_policy
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event, WorkersDied
 from robot_layouts.data.playing.together import (
     BatchError,
@@ -245,6 +245,7 @@ class Summary:
         return "\n".join(
             [
                 *lines,
+                *wait_lines([wait for score in played for wait in score.waits]),
                 *seed_lines("no success", dict(sorted(failed.items()))),
                 *(f"replaced: {death}" for death in self.deaths),
                 *seed_lines("not recorded", reasons),
@@ -290,7 +291,8 @@ def record(
             action, (A,) or (1, A); an episode ends with the first step that is terminated or
             truncated. Or ``"module:name"``, which is imported. As in `evaluate`, a copy
             plays each episode, and the random generators of Python, NumPy and torch start from
-            its seed.
+            its seed. Or ``"ws://host:port"``, where one is served; see
+            `robot_layouts.data.playing.served.policy.ServedPolicy`.
         takeover: May act in the place of the policy, at any step: maps the observation to an
             action, or to None, which lets the policy act. The policy is asked at every step. Or
             ``"module:name"``.

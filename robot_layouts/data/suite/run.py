@@ -12,9 +12,10 @@ from shlex import quote
 from typing import Any
 
 from robot_layouts.core.writing import writing_errors
-from robot_layouts.data.actors import EXPERT, check_policy, find_policy
+from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.evaluation import evaluate
 from robot_layouts.data.playing.executor import Executor, choose_executor
+from robot_layouts.data.playing.policies import check_policy, find_policy
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.receipts.provenance import (
     describe_expert,

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from robot_layouts.core.bounds import expect_unit
 from robot_layouts.core.catalogue import reason
-from robot_layouts.data.actors import PERSON, Actor, actor_of, check_policy, episode_source
+from robot_layouts.data.actors import PERSON, Actor, actor_of, episode_source
+from robot_layouts.data.playing.policies import check_policy, playing
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.data.teleop.steering import Steering
 from robot_layouts.kinematics.rotations import Floats, multiply, quaternion_about
@@ -87,7 +88,7 @@ class Session:
                 cannot be copied.
         """
         self.task, self._recorder = task, recorder
-        self._passed = None if policy is None else check_policy(policy)
+        self._passed = None if policy is None else playing(check_policy(policy), task)
         self._actors = [SOMEBODY]
         if policy is not None:
             self._actors.insert(0, actor_of(policy, policy_name))
