@@ -1,12 +1,13 @@
 """``python -m benchmarks objects``: what every object is, how it stands, and who can hold it.
 
 Each is put on a table for 10 s in all the ways in which it rests, and grasped and shaken by hands
-of three sizes; the page shows what was seen beside a picture of all.
+of three sizes. A page lists all of them, and one of each kind shows them, with an entry each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from math import degrees
 from pathlib import Path
@@ -14,44 +15,60 @@ from typing import Any
 
 from tqdm import tqdm
 
+from benchmarks.packaged import SINGLE
 from benchmarks.records import (
     DOCS,
     Record,
     read_record,
+    render,
     table,
     versions_of,
     write_page,
     write_record,
 )
 from objects import Joint, ObjectDescriptor, ObjectRegistry
+from objects.packaged import PACKAGED, PackagedObject
 from objects.picture import save_sheet
 from objects.registry import CATALOGUE
+from objects.shapes import Mesh, Shape
+from robot_layouts.core.writing import write_whole
 from robot_layouts.simulation.checks.objects import OPENINGS, try_rests, try_thing_grasps
 
 HEADINGS = (
     "object",
     "size (cm)",
     "mass (kg)",
-    "points",
     "joints",
     "rests",
     "drift (mm)",
     *(f"held, {opening * 100:g} cm" for opening in OPENINGS),
 )
-PICTURE = "images/objects.png"
+NAMES = (*CATALOGUE, *SINGLE)
+MANY = tuple(one for one in PACKAGED.values() if one.members > 1)
+SHOWN = 10  # members of those
+KINDS = {
+    "containers": "Containers",
+    "controls": "Controls",
+    "furniture": "Things that open",
+    "joining": "Things to put together",
+    "stock": "Stock and tools",
+    "two_handed": "Things for two hands",
+    "vessels": "Vessels",
+    "metaworld": "Things of Meta-World",
+    "pybullet": "Things of PyBullet",
+    "robosuite": "Things of robosuite",
+}
 
 
-def objects(
-    *, objects: tuple[str, ...] = tuple(CATALOGUE), out: Path = DOCS / "objects.json"
-) -> int:
-    """Try objects in physics, draw all of them, and write their page.
+def objects(*, objects: tuple[str, ...] = NAMES, out: Path = DOCS / "objects.json") -> int:
+    """Try objects in physics, draw those of each kind, and write their pages.
 
     Args:
         objects: Their names; those that are in the record as they are now are not tried again.
-        out: The record; the page is beside it.
+        out: The record; the pages are beside it.
 
     Raises:
-        RobotLayoutsError: If something cannot be read or written.
+        RobotLayoutsError: If something cannot be fetched, read or written.
     """
     record = read_record(out, versions={}, objects={})
     known = record["objects"]
@@ -59,22 +76,103 @@ def objects(
     new = [n for n, thing in things.items() if known.get(n, {}).get("digest") != digest_of(thing)]
     for name in tqdm(new, disable=None):
         record["versions"] = versions_of("sapien")
-        known[name] = _tried(things[name])
-        record["objects"] = {one: known[one] for one in CATALOGUE if one in known}
+        known[name] = {**_described(things[name]), **_tried(things[name])}
+        record["objects"] = {one: known[one] for one in NAMES if one in known}
         write_record(out, record)
-    if new:
-        everything = [ObjectRegistry.load(name) for name in CATALOGUE]
-        save_sheet(everything, out.parent / PICTURE)
-    rows = [(name, *_cells(seen)) for name, seen in record["objects"].items()]
-    shown = table(HEADINGS, rows, numbers=(2, 6, 7, 8, 9))
-    write_page(out, "objects", count=len(rows), versions=record["versions"], table=shown)
+    for name, thing in things.items():
+        known[name] = {
+            **_described(thing),
+            **{key: known[name][key] for key in ("drift", "grasps")},
+        }
+    record["objects"] = {one: known[one] for one in NAMES if one in known}
+    write_record(out, record)
+    pictures = out.parent / "images" / "objects"
+    for kind in dict.fromkeys(kind_of(name) for name in new):
+        own = [ObjectRegistry.load(name) for name in NAMES if kind_of(name) == kind]
+        own += [
+            one.load(seed) for one in MANY if kind_of(one.name) == kind for seed in range(SHOWN)
+        ]
+        save_sheet(own, pictures / f"{kind}.png")
+    for kind in KINDS:
+        _write_kind(out, kind, record)
+    rows = [(_link(name), *_cells(seen)) for name, seen in record["objects"].items()]
+    counts = {
+        "count": len(CATALOGUE),
+        "packaged": len(PACKAGED),
+        "jointed": sum(bool(seen["joints"]) for seen in record["objects"].values()),
+    }
+    shown = table(HEADINGS, rows, numbers=(2, 5, 6, 7, 8))
+    write_page(out, "objects", **counts, kinds=KINDS, versions=record["versions"], table=shown)
     return 0
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of an object: the module of its family, or its package."""
+    if name in PACKAGED:
+        return name.partition("_")[0]
+    return CATALOGUE[name].partition(":")[0].rpartition(".")[2]
 
 
 def digest_of(thing: ObjectDescriptor) -> str:
     """Return what changes with a thing's shapes, rests, grasps and joints."""
-    text = repr((thing.parts, sorted(thing.rests.items()), thing.grasps, *thing.joints))
+    joints = [replace(joint, parts=_portable(joint.parts)) for joint in thing.joints]
+    text = repr((_portable(thing.parts), sorted(thing.rests.items()), thing.grasps, *joints))
     return sha256(text.encode()).hexdigest()[:16]
+
+
+def _portable(parts: Sequence[Shape]) -> tuple[Shape, ...]:
+    """Return shapes without the folders that mesh files are in on this machine."""
+    return tuple(
+        replace(part, file=Path(part.file).name) if isinstance(part, Mesh) else part
+        for part in parts
+    )
+
+
+def _write_kind(out: Path, kind: str, record: Record) -> None:
+    page = out.parent / "objects" / f"{kind}.md"
+    seen = {name: one for name, one in record["objects"].items() if kind_of(name) == kind}
+    entries = {name: [*_entry(one)] for name, one in seen.items()}
+    entries |= {one.name: _family_entry(one) for one in MANY if kind_of(one.name) == kind}
+    write_whole(page, render("objects_kind", kind=kind, title=KINDS[kind], entries=entries))
+
+
+def _family_entry(one: PackagedObject) -> list[tuple[str, str]]:
+    members = f"{one.members:,}, drawn by `ObjectRegistry.load({one.name!r}, seed=7)`"
+    return [("what", one.about), ("members", members), ("licence", one.licence), ("from", one.file)]
+
+
+def _entry(seen: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield what an entry says of an object: what, and a few words."""
+    yield "what", seen["about"]
+    yield "size", " × ".join(f"{length:g}" for length in seen["size"]) + " cm"
+    yield "mass", f"{seen['mass']:g} kg"
+    rests = (f"{rest} ({drift:.3f} mm in 10 s)" for rest, drift in seen["drift"].items())
+    yield "rests", ", ".join(rests)
+    for joint, travel in seen["joints"].items():
+        yield "joint", f"`{joint}` {travel}"
+    if seen["points"]:
+        yield "points", ", ".join(f"`{point}`" for point in seen["points"])
+    held = [
+        f"{holds} of {tried} in a hand of {100 * float(opening):g} cm"
+        for opening, (holds, tried) in seen["grasps"].items()
+        if tried
+    ]
+    yield "grasps that hold", ", ".join(held) or "none; it is worked by pressing"
+    yield "licence", seen["licence"]
+    yield "from", seen["source"]
+
+
+def _described(thing: ObjectDescriptor) -> Record:
+    return {
+        "digest": digest_of(thing),
+        "about": thing.about,
+        "licence": thing.licence,
+        "source": thing.source,
+        "size": [round(100 * length, 1) for length in thing.extent],
+        "mass": float(f"{thing.mass:.2g}"),
+        "points": list(thing.points),
+        "joints": {joint.name: _travel(joint) for joint in thing.joints},
+    }
 
 
 def _tried(thing: ObjectDescriptor) -> Record:
@@ -83,15 +181,7 @@ def _tried(thing: ObjectDescriptor) -> Record:
     for opening in OPENINGS:
         tried = try_thing_grasps(thing, opening)
         grasps[f"{opening:g}"] = [sum(one.holds for one in tried), len(tried)]
-    return {
-        "digest": digest_of(thing),
-        "size": [round(100 * length, 1) for length in thing.extent],
-        "mass": float(f"{thing.mass:.2g}"),
-        "points": list(thing.points),
-        "joints": {joint.name: _travel(joint) for joint in thing.joints},
-        "drift": rests,
-        "grasps": grasps,
-    }
+    return {"drift": rests, "grasps": grasps}
 
 
 def _travel(joint: Joint) -> str:
@@ -100,11 +190,14 @@ def _travel(joint: Joint) -> str:
     return f"turns {degrees(joint.upper - joint.lower):.0f}°"
 
 
+def _link(name: str) -> str:
+    return f"[{name}](objects/{kind_of(name)}.md#{name})"
+
+
 def _cells(seen: Mapping[str, Any]) -> Iterator[str]:
     yield " × ".join(f"{length:g}" for length in seen["size"])
     yield f"{seen['mass']:g}"
-    yield ", ".join(f"`{name}`" for name in seen["points"])
-    yield ", ".join(f"`{name}` {travel}" for name, travel in seen.get("joints", {}).items()) or "–"
+    yield ", ".join(f"`{name}` {travel}" for name, travel in seen["joints"].items()) or "–"
     yield ", ".join(seen["drift"])
     yield f"{max(seen['drift'].values()):.3f}"
     for held, tried in seen["grasps"].values():

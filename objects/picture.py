@@ -151,7 +151,8 @@ def _faces(thing: ObjectDescriptor) -> tuple[Floats, NDArray[np.intp], Floats]:
         found = surface(part)
         found = found._replace(corners=rotate(turned, found.corners))
         normals = found.normals
-        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        areas = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = normals / np.where(areas > 0, areas, 1.0)
         bright = 1 - SHADE * (1 - normals @ light) / 2
         corners.append(found.corners)
         triangles.append(found.triangles + count)

@@ -125,20 +125,19 @@ def pepper_mill(radius: float, height: float) -> Made:
 @family({"radius": Size(0.045, 0.04, 0.05), "height": Size(0.16, 0.14, 0.18)})
 def coffee_press(radius: float, height: float) -> Made:
     """A jug with a plunger that is pressed down while the other hand holds the handle."""
-    wall, top, low = 0.003, height + 0.05, height - 0.03
+    wall, top, low = 0.0025, height + 0.05, height - 0.03
     inner, knob, bar = radius * 0.98 - wall, 0.014, 0.012
     out = radius + 0.036  # the middle of the handle
     pull = loop((radius - 0.004, 0.0, height / 2), UP, FRONT, 0.04, 0.09, bar, PLASTIC)
-    held = grips(
-        (out, 0.0, height / 2), UP, FRONT, bar, "body", offsets=(-0.015, 0.0, 0.015), pitches=LEAN
-    )
+    places = (-0.009, -0.003, 0.003, 0.009)
+    held = grips((out, 0.0, height / 2), UP, FRONT, bar, "body", offsets=places, pitches=PITCHES)
     return Made(
         [
             disc(radius, 0.0, 0.006, PLASTIC),
             *tube((inner, radius, 0.006), (inner, radius, height), PLASTIC),
             *pull,
         ],
-        [*held, *from_above(top + 0.012, 2 * knob * cos(pi / 8), "plunger", FACES, PITCHES)],
+        held,
         {"knob": point(0.0, 0.0, top + 0.024), "inside": point(0.0, 0.0, 0.006)},
         joints=[
             Joint(

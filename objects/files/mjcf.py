@@ -120,6 +120,8 @@ class _Reading:
         self._parts.append(_Moving(None, None, [root]))
         self._follow(root, self._parts[0])
         shapes = [self._shapes(part) for part in self._parts]
+        if not any(shape.visible for own in shapes for shape in own):  # then by what collides
+            shapes = [[replace(shape, visible=True) for shape in own] for own in shapes]
         joints = [
             self._joint(part, own) for part, own in zip(self._parts[1:], shapes[1:], strict=True)
         ]

@@ -10,7 +10,7 @@ pytest.importorskip("matplotlib")
 
 from benchmarks.__main__ import main
 from benchmarks.experts import PAIRS, TASKS
-from benchmarks.objects import digest_of
+from benchmarks.objects import NAMES, digest_of, kind_of
 from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
 from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
@@ -25,7 +25,7 @@ COMMANDS = {
     "robots": ["robots", "--render"],
     "mjcf": ["mjcfs", "--render"],
     "placing": ["placing"],
-    "objects": ["objects"],
+    "objects": ["objects", "--objects", "mug"],  # which needs no package
     "experts": ["experts", "--tasks"],
     "conversions": ["conversions", "--modes", "--tasks", "PickCube-v1"],
     "processors": ["processors", "--render"],
@@ -76,10 +76,15 @@ def test_a_record_is_read_as_it_was_written(tmp_path):
 
 def test_what_the_page_of_objects_promises():
     seen = record("objects")["objects"]
-    assert list(seen) == list(CATALOGUE)
+    assert list(seen) == list(NAMES)
+    assert sum(bool(one["joints"]) for one in seen.values()) >= 25
     for name, one in seen.items():
-        assert one["digest"] == digest_of(ObjectRegistry.load(name)), name
         assert max(one["drift"].values()) < 1.0, name  # mm
+        assert one["licence"] in ("Apache-2.0", "MIT", "Zlib"), name
+        assert f"## {name}\n" in (DOCS / "objects" / f"{kind_of(name)}.md").read_text()
+    for name in CATALOGUE:
+        one = seen[name]
+        assert one["digest"] == digest_of(ObjectRegistry.load(name)), name
         if ObjectRegistry.load(name).grasps:
             assert max(held for held, _ in one["grasps"].values()) >= 20, name
 

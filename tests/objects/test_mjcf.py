@@ -146,6 +146,19 @@ def test_a_second_reading_takes_what_the_first_one_kept(cabinet, tmp_path):
     assert ObjectDescriptor.from_mjcf(cabinet, body="cabinet").mass == pytest.approx(5.37)
 
 
+def test_what_has_nothing_to_draw_is_drawn_by_what_collides(cabinet):
+    hidden = CABINET.replace('size="0.1 0.01 0.05"', 'size="0.1 0.01 0.05" group="4"')
+    cabinet.write_text(hidden.replace('size="0.008 0.078 0.04"', 'size="0.02 0.02 0.02" group="4"'))
+    walls = ObjectDescriptor.from_mjcf(cabinet, body="walls")
+    assert [part.visible for part in walls.parts] == [False, False]
+    cabinet.write_text(
+        "<mujoco><worldbody><body><geom type='box' size='.1 .1 .1' group='4'/></body></worldbody>"
+        "</mujoco>"
+    )
+    (block,) = ObjectDescriptor.from_mjcf(cabinet).parts
+    assert (block.collides, block.visible) == (True, True)
+
+
 def test_bodies_are_chosen_by_name_or_number(cabinet):
     assert ObjectDescriptor.from_mjcf(cabinet, body="walls").name == "walls"
     assert ObjectDescriptor.from_mjcf(cabinet, body=1, name="pin").name == "pin"
