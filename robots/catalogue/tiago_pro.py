@@ -3,12 +3,20 @@
 from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
+from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, RobotDescriptor
 from robots.parts import among, both_sides
 
 BEND, WRIST, TURN = (-2.443461, 1.134464), (-1.8849556, 3.0019662), (-2.6179938, 2.6179938)
 TIPS = ("gripper_{side}_fingertip_left_link", "gripper_{side}_fingertip_right_link")
 OPEN = 0.80285144  # rad
+FINGERS = Fingers(
+    TIPS,
+    opening_signs=(1, 1),
+    max_angle=110.0,
+    opening_axes=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),  # as the tips part
+)
+LEFT_TIPS = ("gripper_left_fingertip_left_link", "gripper_left_fingertip_right_link")
+RIGHT_TIPS = ("gripper_right_fingertip_left_link", "gripper_right_fingertip_right_link")
 BASE = (
     "base_link",
     "base_antenna_left_link",
@@ -104,7 +112,9 @@ TIAGO_PRO = RobotDescriptor(
         ),
     ),
     tcp_link="gripper_left_base_link",
-    tcp_position_links=("gripper_left_fingertip_left_link", "gripper_left_fingertip_right_link"),
+    tcp_position_links=LEFT_TIPS,
+    fingers=replace(FINGERS, links=LEFT_TIPS),
+    gripper_material=GripperMaterial((*LEFT_TIPS, *RIGHT_TIPS), 2.0, 2.0, 0.0, patch_radius=0.1),
     keyframes={
         "rest": (
             0.343331,
@@ -125,7 +135,7 @@ TIAGO_PRO = RobotDescriptor(
             *(0,) * 13,
         )
     },
-    limbs=both_sides("gripper_{side}_base_link", 1.032, (0.0653, 0.1592, 0.7537), None, TIPS),
+    limbs=both_sides("gripper_{side}_base_link", 1.032, (0.0653, 0.1592, 0.7537), FINGERS, TIPS),
     reach=1.2,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, tiago_pro_description; drives from each joint's inertia",
     allowed_collisions=among(

@@ -90,3 +90,12 @@ def test_a_posture_of_an_arm_leaves_all_other_joints_where_they_are():
     like = hand.like(scene, posture)
     assert np.array_equal(like[:7], posture[:7])
     assert np.array_equal(like[7:], scene.qpos("left")[7:])
+
+
+@pytest.mark.long
+def test_fingers_that_draw_back_as_they_open_close_on_a_large_cube():
+    hand = Hand(tasks.make(TASK, robots="tiago_pro"), "left")
+    assert hand.motion.middle(1.0)[2] < hand.motion.middle(0.0)[2] - 0.01
+    grip = hand.grip(0.048, 0.4)
+    assert grip is not None
+    assert grip.share < 0.9

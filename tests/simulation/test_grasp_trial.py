@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 
+import pytest
+
 from robot_layouts.simulation.checks.grasp import try_grasps
 from robots import RobotRegistry
 from tests.simulation.test_trial import driven
@@ -42,3 +44,10 @@ def test_a_drive_that_is_too_weak_grasps_nothing():
 
 def test_a_robot_without_a_gripper():
     assert list(try_grasps(RobotRegistry.load("panda_stick"))) == []
+
+
+@pytest.mark.long
+def test_both_hands_of_a_tiago_pro_hold_a_cube():
+    left, right = try_grasps(RobotRegistry.load("tiago_pro"))
+    assert left.problem is None
+    assert right.problem is None
