@@ -287,12 +287,14 @@ class ActionSplit(Mapping[str, slice]):
 
     Attributes:
         groups: The joint groups by name.
+        joints: Every driven joint, group after group.
         size: How many action numbers drive them.
     """
 
-    __slots__ = ("_slices", "groups", "size")
+    __slots__ = ("_slices", "groups", "joints", "size")
 
     groups: Mapping[str, JointGroup]
+    joints: tuple[str, ...]
     size: int
 
     def __init__(self, **groups: JointGroup) -> None:
@@ -322,6 +324,7 @@ class ActionSplit(Mapping[str, slice]):
             start += group.size
         object.__setattr__(self, "groups", MappingProxyType(dict(groups)))
         object.__setattr__(self, "_slices", slices)
+        object.__setattr__(self, "joints", tuple(joints))
         object.__setattr__(self, "size", start)
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -359,11 +362,6 @@ class ActionSplit(Mapping[str, slice]):
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle by the groups."""
         return (_split_from_groups, (dict(self.groups),))
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Every driven joint, group after group."""
-        return tuple(joint for group in self.groups.values() for joint in group.joints)
 
     def replace(self, **groups: JointGroup) -> ActionSplit:
         """Return a split with some groups exchanged (new names go to the end)."""

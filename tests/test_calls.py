@@ -16,12 +16,12 @@ from tests.fresh_process import in_fresh_process
 
 ROOT = str(Path(__file__).resolve().parents[1])
 MOST = {
-    "make, first": 8_600,  # importing the room `objects` takes some
-    "make, again": 3_400,
+    "make, first": 7_600,
+    "make, again": 2_800,
     "step": 130,
-    "plan": 13_000,
-    "search": 150_000,
-    "from_urdf": 12_000,
+    "plan": 12_500,
+    "search": 140_000,
+    "from_urdf": 10_500,
 }
 
 
