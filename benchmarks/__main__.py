@@ -16,6 +16,7 @@ from benchmarks.planning import planning
 from benchmarks.processors import processors
 from benchmarks.robots.survey import mjcfs, robots
 from benchmarks.site.pictures import pictures
+from benchmarks.skills import skills
 from benchmarks.soak import soak
 from benchmarks.teleop import teleop
 from robot_layouts.core.cli import Command, Program
@@ -40,6 +41,7 @@ PROGRAM = Program(
             packaged,
             objects,
             experts,
+            skills,
             conversions,
             processors,
             imitation,

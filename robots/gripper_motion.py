@@ -23,7 +23,7 @@ from robots.urdf.tree import kinematic_tree
 _AXIS_ALIGNED = 0.7  # cosine; a TCP link that is turned less has the gripper's frame
 _SHORT = 1e-4  # m; shorter ways have no direction
 _POSTURES = 9  # of the gripper between its limits, of which the most closed and the next count
-_SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
+SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
 _LEAST_WORK = 1e-9  # J; of drives that have no stiffness
 _AJAR = 8  # number of the share at which the pads' way is seen
 
@@ -70,8 +70,8 @@ class GripperMotion:
             )
         stiffness = [np.broadcast_to(group.stiffness, len(group.joints)) for group in groups]
         self._work = float(np.concatenate(stiffness) @ self._travels**2)
-        rows = np.tile(home_of(robot, tree), (len(_SHARES), 1))
-        rows[:, places] = self._positions(_SHARES)
+        rows = np.tile(home_of(robot, tree), (len(SHARES), 1))
+        rows[:, places] = self._positions(SHARES)
         poses = tree.forward(rows)
         tcp = find_tcp(robot, tree)
         hand = np.linalg.inv(poses[:, tcp.turned])
@@ -86,7 +86,7 @@ class GripperMotion:
         self.openings = np.linalg.norm(one - other, axis=1)
         first, second = (poses[:, finger, :3, :3] for finger in fingers)
         self.angles = _turned(np.swapaxes(first, 1, 2) @ second)
-        wrist = transform(hand[0], poses[0, _wrist(robot, tree), :3, 3])
+        wrist = transform(hand[0], poses[0, wrist_of(robot, tree), :3, 3])
         self.turn = _axes(self._middles[0] - wrist, (one - other)[_AJAR])
 
     @property
@@ -101,12 +101,12 @@ class GripperMotion:
     def share(self, opening: float) -> float:
         """Return the least share at which the pads are so far apart (m); 1 if they never are."""
         wide = np.flatnonzero(self.openings >= opening)
-        return float(_SHARES[wide[0]]) if len(wide) else float(_SHARES[self.openings.argmax()])
+        return float(SHARES[wide[0]]) if len(wide) else float(SHARES[self.openings.argmax()])
 
     def slope(self, share: float) -> float:
         """Return how much wider the gripper opens per share there (m)."""
         low, high = np.clip((share - 0.05, share + 0.05), 0.0, 1.0)
-        wide = np.interp((low, high), _SHARES, self.openings)
+        wide = np.interp((low, high), SHARES, self.openings)
         return float((wide[1] - wide[0]) / (high - low))
 
     def pressing(self, force: float, share: float) -> float:
@@ -132,7 +132,7 @@ class GripperMotion:
 
     def middle(self, share: float) -> Floats:
         """Return the point between the pads at a share, in the TCP link's frame, (3,) (m)."""
-        columns = [np.interp(share, _SHARES, column) for column in self._middles.T]
+        columns = [np.interp(share, SHARES, column) for column in self._middles.T]
         return np.array(columns)
 
     def _positions(self, shares: Floats) -> Floats:
@@ -216,7 +216,7 @@ def gripper_frame(robot: RobotDescriptor) -> Floats:
         return np.eye(3)
 
 
-def _wrist(robot: RobotDescriptor, tree: Tree) -> int:
+def wrist_of(robot: RobotDescriptor, tree: Tree) -> int:
     """Return the link that the last joint of the arm moves."""
     arm = [joint.child for joint in _model(robot).ordered if joint.name in robot.arm_joints]
     return max(map(tree.link, arm), key=lambda at: len(tree.path(at)), default=0)

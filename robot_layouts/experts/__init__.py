@@ -7,6 +7,11 @@ Writing one, which is a function of a task and a seed:
     first_success: Tries scripts in a private copy of the task; the actions of the first that works.
     Script, Waypoint, Scene: What each robot does, one thing after the other, in worlds as seen now.
     pick, cube_grips, thing_grips: Waypoints that grasp a body, and where a gripper may hold it.
+    grasp, carry, bring, lift, place, release, hold: Skills of any arm that has fingers on any thing
+        that has grasps; each chooses a way that is in reach and has room.
+    operate, press, insert, pour, pouring: Joints that are moved or pushed, pegs, vessels.
+    hand_over, lift_together: Skills of several arms.
+    resting, point_at: Where a thing rests, and where a point of it is.
     move_joint, moved_along: Waypoints that open or turn what a gripper holds.
     in_reach: Those grips that an arm can come to.
     need_fingers: Refuses robots that cannot.
@@ -60,6 +65,23 @@ from robot_layouts.experts.rehearsal import (
     search,
 )
 from robot_layouts.experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
+from robot_layouts.experts.skills import (
+    bring,
+    carry,
+    grasp,
+    hold,
+    insert,
+    lift,
+    operate,
+    place,
+    point_at,
+    pour,
+    pouring,
+    press,
+    release,
+    resting,
+)
+from robot_layouts.experts.together import hand_over, lift_together
 
 __all__ = [
     "CLOSED",
@@ -76,25 +98,41 @@ __all__ = [
     "Script",
     "Waypoint",
     "backed_off",
+    "bring",
     "bringing",
+    "carry",
     "cube_grips",
     "find_expert",
     "first_success",
     "follow",
+    "grasp",
     "gripper_facing",
+    "hand_over",
     "heading",
     "held_at",
+    "hold",
     "holding",
     "in_reach",
+    "insert",
     "is_near",
+    "lift",
+    "lift_together",
     "list_experts",
     "move_joint",
     "moved_along",
     "need_fingers",
+    "operate",
     "pick",
+    "place",
     "planar_distance",
+    "point_at",
+    "pour",
+    "pouring",
+    "press",
     "register_expert",
     "rehearse",
+    "release",
+    "resting",
     "search",
     "thing_grips",
     "turn",

@@ -24,7 +24,7 @@ from robot_layouts.simulation.checks.closing import Closing
 from robot_layouts.simulation.checks.trial import NAME
 from robots import RobotDescriptor
 from robots.action_split import is_gripper
-from robots.gripper_motion import aiming_joints, gripper_motion, link_tree
+from robots.gripper_motion import SHARES, aiming_joints, gripper_motion, link_tree, wrist_of
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 
@@ -39,6 +39,11 @@ QUICK = 2.0  # times that quick drives nearly settle in a control step
 WIDER = (1.45, 2.0, 1.2)  # than a cube a gripper is open before it closes, in the order of trial
 ASIDE = (0.0, 0.25, -0.25, 0.5, -0.5)  # of its side: how far from the middle of the pads it may be
 FIRMNESSES = (1.0, 2.5)  # factors on the force with which a cube is held; the first that suffices
+CLOSING, STEP = 60.0, 4e-4  # N with which fingers close, at least; m per step, at least
+YIELD = 6e-5  # m that quick fingers are driven into what they hold, at least
+PARALLEL = 0.05  # rad; jaws that are turned less need no trial
+LEAST_SIDE = 0.012  # m; of the smallest cube that they are tried with
+MIDDLE_DEPTHS = (0.0, 0.2, -0.2, 0.4)  # shares of its side before the middle of the pads
 SLIPS = 0.1  # of a cube's side that it may move in a hand that is shaken
 
 
@@ -77,12 +82,14 @@ class Grip:
         share: How far the gripper is open before it closes.
         held: How far it is open when it holds the box.
         firmness: Factor on the usual force with which it has to hold the box.
+        shut: Pose of the box in the TCP link's frame then.
     """
 
     pose: Floats
     share: float
     held: float
     firmness: float
+    shut: Floats
 
 
 class Hand:
@@ -97,6 +104,7 @@ class Hand:
         columns: Indices of the arm's joints among the robot's, those of a head or a torso that are
             driven with it included.
         base: Pose of the robot's base in the world, (4, 4) (m).
+        links: Names of the hand's links.
     """
 
     def __init__(self, task: TaskEnv, arm: str) -> None:
@@ -116,6 +124,8 @@ class Hand:
         pose = layout[self.owner].base_pose
         self.base = pose_matrix(pose.position, pose.quaternion)
         whole = link_tree(robot)
+        wrist = wrist_of(own, whole)
+        self.links = {link for i, link in enumerate(whole.links) if wrist in whole.path(i)}
         self._tree = whole.towards(find_tcp(own, whole).needed)
         self._tcp = find_tcp(own, self._tree)
         self._aiming = [robot.joints.index(joint) for joint in aiming_joints(robot, own)]
@@ -175,6 +185,58 @@ class Hand:
         """Return the pose of a body in the TCP link's frame, (4, 4) (m)."""
         return inverse_pose(self.link(self.qpos(scene)[None])[0]) @ pose_matrix(*scene.body(body))
 
+    def shut(self, opening: float) -> Floats | None:
+        """Return the frame of the gripper where it holds what is so wide, (4, 4) (m), or None.
+
+        It is that of `robots.gripper_motion` with its origin in the middle of the thing, in the TCP
+        link's frame. Jaws that turn as they close are seen to hold a cube in physics first; if they
+        do not, there is none.
+
+        Args:
+            opening: How wide (m).
+        """
+        share = self.motion.share(opening)
+        if self._turned(share) < PARALLEL:
+            return self.pointing(self.motion.middle(share))
+        side = max(opening, LEAST_SIDE)
+        grips = (self.grip(side, depth) for depth in MIDDLE_DEPTHS)
+        grip = next((grip for grip in grips if grip is not None), None)
+        if grip is None:
+            return None
+        return self.opened_from(self.pointing(grip.shut[:3, 3]), side, opening)
+
+    def opened_from(self, shut: Floats, opening: float, wider: float) -> Floats:
+        """Return the frame of `shut` with the gripper open, the thing halfway between the jaws.
+
+        Args:
+            shut: See there.
+            opening: How wide the thing is (m).
+            wider: How far the gripper is open (m).
+        """
+        frame, middle = shut.copy(), self.motion.middle
+        frame[:3, 3] += middle(self.motion.share(wider)) - middle(self.motion.share(opening))
+        return frame
+
+    def _turned(self, share: float) -> float:
+        """Return how far the pads are turned against each other at a share (rad)."""
+        return float(np.interp(share, SHARES, self.motion.angles))
+
+    def closing(self, opening: float) -> float:
+        """Return the force with which it closes until it feels what is so wide (m) (N)."""
+        return max(CLOSING, self.motion.force(STEP, self.motion.share(opening)))
+
+    def holding(self, force: float, opening: float) -> float:
+        """Return the force to ask for so that it holds what it moves by a force (N).
+
+        Of what quick drives press with, little is left once they have settled.
+
+        Args:
+            force: With which the thing is to be held (N).
+            opening: How wide it is (m).
+        """
+        least = self.motion.force(YIELD, self.motion.share(opening)) if self.quick else 0.0
+        return max(force, least)
+
     def pointing(self, place: Floats) -> Floats:
         """Return the gripper's frame with its origin at a place, in the TCP link's, (4, 4) (m)."""
         frame = np.eye(4)
@@ -203,9 +265,7 @@ class Hand:
             loose: Whether the gripper may be turned otherwise by as much as an arm of few joints.
         """
         if scatter:
-            more = np.tile(starts[0], (RANDOM_STARTS, 1))
-            more[:, self._aiming] = self._random
-            starts = np.concatenate([starts, more])
+            starts = np.concatenate([starts, self.scattered(starts[0])])
         n, s = len(places), len(starts)
         root = np.linalg.inv(self.base)
         goal = IkGoal(
@@ -224,6 +284,16 @@ class Hand:
         chosen = which * s + ways.argmin(axis=1)[which]
         reached = self.link(qpos[chosen])[:, :3, :3] @ frame[:3, :3]
         return HandPostures(which, qpos[chosen], reached, turned[chosen])
+
+    def scattered(self, qpos: Floats) -> Floats:
+        """Return the same few random postures of the arm every time, (k, dof) (rad, m).
+
+        Args:
+            qpos: All other joints, (dof,) (rad, m).
+        """
+        more = np.tile(qpos, (RANDOM_STARTS, 1))
+        more[:, self._aiming] = self._random
+        return more
 
     def _descended(self, goal: IkGoal, rows: Floats, worth: float) -> Floats:
         """Bring rows of postures towards a goal; those that are far from it soon are left there."""
@@ -265,7 +335,7 @@ def _grip(
             continue
         closed = closing.close(qpos, place, firmness)
         if closed.held and closed.slipped < SLIPS * side:
-            return Grip(pose, share, closed.share, firmness)
+            return Grip(pose, share, closed.share, firmness, closed.pose)
     return None
 
 

@@ -179,9 +179,10 @@ class Player:
             free = (goal for goal in goals if not sought or self._is_free(goal, scene))
             self._goal = next(free, goals[0])
         self._current = waypoint
-        self._gripper, self._share, self._squeeze = (
-            waypoint.gripper, waypoint.share, waypoint.squeeze
-        )  # fmt: skip
+        if waypoint.gripper is not None:
+            self._gripper, self._share, self._squeeze = (
+                waypoint.gripper, waypoint.share, waypoint.squeeze
+            )  # fmt: skip
         self._begun, self._elapsed = self._begun + 1, 0
         self._nearest_yet, self._waited = np.inf, 0
 

@@ -80,6 +80,18 @@ class Scene:
         """Return whether a robot's fingers hold a body."""
         return bool(self._state.is_grasping(robot, body)[0])
 
+    def pressure(self, robot: str, body: str) -> float:
+        """Return the force with which a robot's fingers press on a body, the lesser of two (N).
+
+        Args:
+            robot: A robot that has fingers.
+            body: The body.
+        """
+        fingers = self._layout.arm(robot).robot.fingers
+        assert fingers is not None
+        forces = [self._state.contact_force(robot, link, body)[0] for link in fingers.links]
+        return float(min(np.linalg.norm(force) for force in forces))
+
 
 @dataclass(frozen=True)
 class Waypoint:
@@ -89,7 +101,8 @@ class Waypoint:
         name: What it is called in the script of its robot.
         to: Poses of the TCP, worked out from the scene when the waypoint begins; of those in
             reach the one with the shortest way there is taken. Without it and ``turn`` it stays.
-        gripper: Action number of the gripper meanwhile, `OPEN` … `CLOSED`.
+        gripper: Action number of the gripper meanwhile, `OPEN` … `CLOSED`; None lets it go on as in
+            the waypoint before.
         after: Waypoints of other robots, ``"robot.name"``, that must be done before it begins;
             until then the robot keeps the previous one.
         near: Arm joints count as arrived when all are this near (rad).
@@ -109,7 +122,7 @@ class Waypoint:
 
     name: str
     to: Callable[[Scene], Sequence[Pose]] | None = None
-    gripper: float = OPEN
+    gripper: float | None = OPEN
     after: tuple[str, ...] = ()
     near: float = 0.05
     steps: int = 0

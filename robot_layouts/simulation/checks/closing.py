@@ -9,7 +9,7 @@ import numpy as np
 
 from layouts import Layout
 from objects.shapes import Box
-from robot_layouts.kinematics.rotations import Floats, inverse, rotate
+from robot_layouts.kinematics.rotations import Floats, inverse, inverse_pose, pose_matrix, rotate
 from robot_layouts.simulation.checks.overlaps import stand
 from robot_layouts.simulation.checks.trial import NAME, RobotAlone
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
@@ -34,12 +34,14 @@ class Closed(NamedTuple):
         slipped: How far it moved in the hand meanwhile (m); infinite if it was thrown away.
         share: How far the gripper was open once it had closed; see
             `robots.gripper_motion.GripperMotion`.
+        pose: Of the cube in the TCP link's frame then, (4, 4) (m).
     """
 
     grasped: bool
     held: bool
     slipped: float
     share: float
+    pose: Floats
 
 
 class Closing:
@@ -86,6 +88,7 @@ class Closing:
             target[self._gripper] = self._pressed(firmness)
             alone.step(alone.numbers_for(target))
         grasped, first, share = self._grasps(), self._in_hand(), self._share()
+        pose = self._in_link()
         slipped, grasps = 0.0, list[bool]()
         arm = [joint for joint in self._part.joints if joint in self._part.arm_joints][:1]
         for step in range(_HOLDING + _SHAKING):
@@ -99,7 +102,7 @@ class Closing:
             way = float(np.linalg.norm(self._in_hand() - first))
             slipped = max(slipped, way if np.isfinite(way) else np.inf)
         held = grasped and any(grasps[-_PERIOD:])
-        return Closed(grasped, held, slipped, share)
+        return Closed(grasped, held, slipped, share, pose)
 
     def _begin(self, open_: Floats, place: tuple[Floats, Floats]) -> None:
         stand(self._alone.simulation)
@@ -120,6 +123,12 @@ class Closing:
 
     def _grasps(self) -> bool:
         return bool(self._alone.simulation.read().is_grasping(self._arm, CUBE)[0])
+
+    def _in_link(self) -> Floats:
+        state = self._alone.simulation.read()
+        link = state.link_pose(self._arm, self._part.tcp_link)[0].astype(float)
+        cube = state.pose(CUBE)[0].astype(float)
+        return inverse_pose(pose_matrix(link[:3], link[3:])) @ pose_matrix(cube[:3], cube[3:])
 
     def _in_hand(self) -> Floats:
         """Return where the cube is in the frame of the first finger, (3,) (m)."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -42,21 +43,30 @@ class RobotsAlone:
         self._simulation = Simulation(layout, build, 1, physics, control_frequency=1 / timestep)
         self._still = np.zeros((1, layout.action_dim), np.float32)
 
-    def overlaps(self, postures: Mapping[str, Joints] | None = None) -> list[Overlap]:
-        """Return what overlaps by more than `DEPTH`, the deepest first.
+    def overlaps(
+        self,
+        postures: Mapping[str, Joints] | None = None,
+        poses: Mapping[str, tuple[Joints, Joints]] = MappingProxyType({}),
+        than: float = DEPTH,
+    ) -> list[Overlap]:
+        """Return what overlaps by more than a length, the deepest first.
 
         Takes one step of physics.
 
         Args:
             postures: Joint positions of robots, each (dof,) in its descriptor's order (rad, m); the
                 others stand where the layout starts them.
+            poses: Where bodies are put, by name: position, (3,) (m), and quaternion, wxyz.
+            than: The length (m).
         """
         alone = self._simulation
         stand(alone)
+        for name, pose in poses.items():
+            alone.worlds[0].set_pose(name, *pose)
         for name, qpos in (postures or {}).items():
             alone.worlds[0].stand(name, qpos)
         alone.step(self._still, alone.read().joint_positions)
-        return deepest(alone.backend.overlaps(0))
+        return deepest(alone.backend.overlaps(0), than)
 
 
 def starting_overlaps(
