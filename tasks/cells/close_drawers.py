@@ -8,18 +8,19 @@ from layouts import ring
 from tasks import CellTask, EpisodeRandom, Object, State, World, register_task
 from tasks.maths import Array, Floats
 
-SHUT, AWAY = 0.01, 0.2  # of a drawer, and of a case from the middle (m)
+SHUT = 0.01  # of a drawer (m)
+AREA = ([0.2, -0.05], [0.28, 0.05])  # of a case, from the middle towards its arm, and aside (m)
 SIDES = {"first": (0.0, -1.0), "second": (0.866, 0.5), "third": (-0.866, 0.5)}
 OPENED = {"drawer": (0.07, 0.12)}  # m, in a case of full size
-TURN, ASIDE = 0.25, 0.05  # rad, m
+TURN = 0.25  # rad
 
 
 @register_task("CellCloseDrawers-v1")
 class CellCloseDrawers(CellTask):
     """Close all drawers, each arm the one before it.
 
-    The cases stand back to back, their fronts towards the arms, up to 5 cm aside and turned by up
-    to 14°; the drawers are open by 6 to 10 cm.
+    The cases stand back to back, their fronts towards the arms, 20 to 28 cm from the middle, up to 5
+    cm aside and turned by up to 14°; the drawers are open by 6 to 10 cm.
 
     Success: no drawer is open by more than 1 cm.
     """
@@ -43,8 +44,8 @@ class CellCloseDrawers(CellTask):
         """Stand the cases, their drawers open."""
         super().sample(world, rng)
         for arm, (x, y) in SIDES.items():
-            aside = rng.uniform_between([-ASIDE], [ASIDE]).item()
-            place = (AWAY * x - aside * y, AWAY * y + aside * x, 0.0)
+            out, aside = rng.uniform_between(*AREA).tolist()
+            place = (out * x - aside * y, out * y + aside * x, 0.0)
             ahead = atan2(y, x)
             world.set_pose(f"case_{arm}", place, rng.yaw_quaternion(ahead - TURN, ahead + TURN))
 

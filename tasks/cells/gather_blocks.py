@@ -72,7 +72,5 @@ class CellGatherBlocks(CellTask):
         }
 
     def ways(self, state: State) -> list[Floats]:
-        """Of the blocks to the middle, and of the tips to their blocks."""
-        blocks = {arm: f"block_{arm}" for arm in SIDES}
-        tips = [state.tcp_distance(arm, block) for arm, block in blocks.items()]
-        return [*(state.planar_distance(block, "mark") for block in blocks.values()), *tips]
+        """Of the blocks to the middle."""
+        return [state.planar_distance(f"block_{arm}", "mark") for arm in SIDES]

@@ -8,15 +8,16 @@ from layouts import single
 from robot_layouts import experts
 from robot_layouts.__main__ import main
 from robot_layouts.data.gate import check_task, rank_correlation
-from tasks import Area, CellTask, Cube, register_task
+from tasks import Area, CellTask, Cube, Table, register_task
 
 
 class GateReach(CellTask):
     """Bring the hand near the cube."""
 
     layout = single({"arm": "panda"})
-    max_episode_steps = 30
+    max_episode_steps = 80
     stages = {"is_coming": 0.5, "success": 1.0}  # noqa: RUF012
+    table = Table()
     cube = Cube(0.02, spawn=Area(x=(0.0, 0.1), y=(-0.25, 0.25)))
 
     def evaluate(self, state):

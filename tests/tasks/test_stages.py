@@ -9,7 +9,7 @@ import pytest
 import tasks
 from layouts import single
 from robots import TaskError, UnknownNameError
-from tasks import Area, CellTask, Cube, Randomization, Uniform, register_task
+from tasks import Area, CellTask, Cube, Randomization, Table, Uniform, register_task
 from tasks.description import instruction_of
 from tasks.interfaces.vector import VectorTask
 from tests.tasks.own import put
@@ -26,6 +26,7 @@ class StagedLift(CellTask):
     instruction = PHRASES
     stages = {"is_near": 0.3, "is_above": 0.6, "success": 1.0}  # noqa: RUF012
     varied = {"mass": {"cube": Uniform(0.5, 2.0)}}  # noqa: RUF012
+    table = Table()
     cube = Cube(0.02, spawn=Area(x=(-0.1, 0.1), y=(0.1, 0.2), yaw=(-0.5, 0.5)))
 
     def evaluate(self, state):
