@@ -23,7 +23,6 @@ from tasks.episode import play
 WIDTH, HEIGHT = 640, 340  # of rendered pictures (pixels)
 FRAME, LAST = 60, 1500  # how long a frame stays, and the last one (ms)
 COLOURS = 64  # of a drawing
-TILE, COLUMNS, TONES = 256, 4, 192  # of the sheet of cells: a tile (pixels), and its colours
 VIEW = Camera((1.2, 0.0, 1.05), (-0.05, 0.0, 0.2), "view", WIDTH, HEIGHT, 0.82)  # m, rad
 
 
@@ -33,7 +32,7 @@ def pictures(names: Sequence[str] = (), *, out: Path = DOCS / "images") -> int:
     They are committed, so that nobody needs a Vulkan driver or a planner to see them.
 
     Args:
-        names: hand_over.webp, placement_search.png, crossing.png, cells.png (all).
+        names: hand_over.webp, placement_search.png, crossing.png (all).
         out: Their folder.
 
     Raises:
@@ -97,20 +96,6 @@ def crossing(path: Path) -> None:
     plan(cell, ready.end, _beside(cell, -1)).picture(path)
 
 
-def cells(path: Path) -> None:
-    """Draw every cell as its expert leaves it, in the order of their names."""
-    names = [name for name in tasks.list_tasks() if name.startswith("Cell")]
-    rows = -(-len(names) // COLUMNS)
-    sheet = Image.new("RGB", (COLUMNS * TILE, rows * TILE), "white")
-    for number, name in enumerate(tqdm(names, desc=path.name, unit="cells", disable=None)):
-        task = tasks.make(name, render_mode="rgb_array", visuals="light")
-        play(task, 0, np.asarray(find_expert(name)(task, 0)))
-        tile = Image.fromarray(task.render()[0]).resize((TILE, TILE), Image.Resampling.LANCZOS)
-        sheet.paste(tile, (number % COLUMNS * TILE, number // COLUMNS * TILE))
-        task.close()
-    sheet.quantize(TONES).save(path, optimize=True)
-
-
 def _beside(cell: Layout, step: int) -> dict[str, TcpGoal]:
     """Return goals before the bases that stand some places further in a ring."""
     bases = [placement.base_position for placement in cell.values()]
@@ -124,5 +109,4 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "hand_over.webp": hand_over,
     "placement_search.png": placement_search,
     "crossing.png": crossing,
-    "cells.png": cells,
 }

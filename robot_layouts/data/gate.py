@@ -128,7 +128,7 @@ class _Episodes:
         self._watch = ArmWatch(env)
 
     def starts(self) -> dict[int, list[Overlap]]:
-        """Return by seed what is inside something else in the first moment, with all arms at rest."""
+        """Return by seed what is inside something else in the first moment, arms at rest."""
         found: dict[int, list[Overlap]] = {}
         for seed in self.seeds:
             self._env.reset(seed, REBUILT)

@@ -19,8 +19,8 @@ TURN = 0.25  # rad
 class CellCloseDrawers(CellTask):
     """Close all drawers, each arm the one before it.
 
-    The cases stand back to back, their fronts towards the arms, 20 to 28 cm from the middle, up to 5
-    cm aside and turned by up to 14°; the drawers are open by 6 to 10 cm.
+    The cases stand back to back, their fronts towards the arms, 20 to 28 cm from the middle, up to
+    5 cm aside and turned by up to 14°; the drawers are open by 6 to 10 cm.
 
     Success: no drawer is open by more than 1 cm.
     """
