@@ -19,10 +19,8 @@ def test_the_scores_of_an_episode_are_proofs(task_id):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("count", [3, 5])
-def test_rings_may_have_any_number_of_arms(count):
-    robots = {f"arm{i}": "panda" for i in range(count)}
-    ring = layouts.ring(robots, radius=0.8 + 0.05 * count)
-    for task_id in ("CellShiftRing-v1", "CellPassAround-v1"):
-        env = tasks.make(task_id, layout=ring)
-        assert play(env, 0, find_expert(task_id)(env, 0)).solved
+@pytest.mark.parametrize("task_id", ["CellPassAround-v1", "CellShiftRing-v1"])
+def test_rings_may_have_another_number_of_arms(task_id):
+    ring = layouts.ring({f"arm{i}": "panda" for i in range(5)}, radius=1.05)
+    env = tasks.make(task_id, layout=ring)
+    assert play(env, 0, find_expert(task_id)(env, 0)).solved
