@@ -14,6 +14,7 @@ Making an environment of it for other programs (each loads its package when it i
 
 Writing a task (functions of arrays are in `tasks.maths`):
     MultiRobotTask: What a task's class subclasses.
+    CellTask: One in stages, on a table; says what is seen and rewarded unless told otherwise.
     TaskEnv: What `make` returns: environments that step a task.
     register_task: Gives it its names.
     Needs: What a place needs of the robot that stands there.
@@ -55,6 +56,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "Camera",
     "CameraShift",
     "Capsule",
+    "CellTask",
     "Choice",
     "Color",
     "Compound",

@@ -12,7 +12,7 @@ from robot_layouts.core.commands import notice
 from robots import RobotDescriptor, TaskError
 from robots.named import FORMS, is_path, named_robot
 from tasks.language.needs import ACT, HOLD
-from tasks.randomization.declaration import Randomization
+from tasks.randomization.declaration import SETTINGS, Randomization
 
 PlacedRobot = Annotated[str, Word("PLACE=ROBOT", about=FORMS)]
 
@@ -52,8 +52,8 @@ class CellOptions(RecordedCell):
     """Which robots stand where, and what varies.
 
     Attributes:
-        randomization: Let things vary from episode to episode: a tasks.Randomization in YAML or
-            json.
+        randomization: What varies from episode to episode: a setting of the task (fixed, spread,
+            varied), or a tasks.Randomization in YAML or json.
     """
 
     randomization: File | None = None
@@ -62,7 +62,10 @@ class CellOptions(RecordedCell):
         """Return the arguments of `tasks.make` that are given; see `RecordedCell.making`."""
         chosen = super().making()
         if self.randomization is not None:
-            chosen["randomization"] = Randomization.load(self.randomization)
+            setting = str(self.randomization) in SETTINGS
+            chosen["randomization"] = (
+                str(self.randomization) if setting else Randomization.load(self.randomization)
+            )
         return chosen
 
 

@@ -183,8 +183,10 @@ def read_docstring(cls: type[MultiRobotTask]) -> Docstring:
     return Docstring(summary, "\n".join(filter(None, drawn)), success)
 
 
-def instruction_of(cls: type[MultiRobotTask]) -> str:
-    """Return what robots are told to do in a task, in a sentence."""
+def instruction_of(cls: type[MultiRobotTask], seed: int = 0) -> str:
+    """Return what robots are told to do in the episode of a seed, in a sentence."""
+    if isinstance(cls.instruction, tuple):
+        return cls.instruction[seed % len(cls.instruction)]
     return cls.instruction or read_docstring(cls).summary
 
 
@@ -209,6 +211,12 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
         ("parity", parity_verdicts().get(cls.task_id, "")),
     ):
         rows.add_row(name, value or UNKNOWN)
+    phrasings = cls.instruction if isinstance(cls.instruction, tuple) else ()
+    for i, phrasing in enumerate(phrasings):
+        rows.add_row("" if i else "instruction", phrasing)
+    if cls.stages:
+        scores = ", ".join(f"{name} {score:g}" for name, score in cls.stages.items())
+        rows.add_row("stages", scores)
     yield rows
     if cls.fits_robots:
         yield f"\nFits its robots: {fit_text(env)}"

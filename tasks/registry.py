@@ -25,6 +25,17 @@ CLONES = "tasks.maniskill."  # where the tasks that clone one of ManiSkill's are
 
 # One line per task, sorted by id: id -> module:class.
 CATALOGUE = {
+    "CellBuildBridge-v1": "tasks.cells.build_bridge:CellBuildBridge",
+    "CellCloseDrawers-v1": "tasks.cells.close_drawers:CellCloseDrawers",
+    "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",
+    "CellLiftBoard-v1": "tasks.cells.lift_board:CellLiftBoard",
+    "CellLiftPot-v1": "tasks.cells.lift_pot:CellLiftPot",
+    "CellPassAround-v1": "tasks.cells.pass_around:CellPassAround",
+    "CellPressTogether-v1": "tasks.cells.press_together:CellPressTogether",
+    "CellPutAndClose-v1": "tasks.cells.put_and_close:CellPutAndClose",
+    "CellPutAway-v1": "tasks.cells.put_away:CellPutAway",
+    "CellShiftRing-v1": "tasks.cells.shift_ring:CellShiftRing",
+    "CellSortCubes-v1": "tasks.cells.sort_cubes:CellSortCubes",
     "DrawTriangle-v1": "tasks.maniskill.draw_triangle:DrawTriangle",
     "FourRobotStack-v1": "tasks.originals.four_robot_stack:FourRobotStack",
     "LiftPegUpright-v1": "tasks.maniskill.lift_peg_upright:LiftPegUpright",
@@ -266,6 +277,8 @@ def make_scenario(
     if robots is not None:
         scenario.layout = _replace_robots(cls, scenario.layout, robots)
     scenario.num_envs = num_envs
+    if isinstance(name := making.get("randomization"), str):
+        making["randomization"] = cls.setting(name)
     for name, value in making.items():
         setattr(scenario, name, value)
     return scenario

@@ -24,6 +24,7 @@ from robot_layouts.simulation import (
 )
 from robot_layouts.simulation.state import once_per_state
 from robots.descriptor import Quaternion, Vector3
+from tasks.engine.cell import CellTask
 from tasks.engine.env import MultiRobotTask, TaskEnv
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import Info

@@ -22,6 +22,17 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
+    "CellBuildBridge-v1": "robot_layouts.experts.cells.build_bridge:build_bridge",
+    "CellCloseDrawers-v1": "robot_layouts.experts.cells.close_drawers:close_drawers",
+    "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
+    "CellLiftBoard-v1": "robot_layouts.experts.cells.lift_board:lift_board",
+    "CellLiftPot-v1": "robot_layouts.experts.cells.lift_pot:lift_pot",
+    "CellPassAround-v1": "robot_layouts.experts.cells.pass_around:pass_around",
+    "CellPressTogether-v1": "robot_layouts.experts.cells.press_together:press_together",
+    "CellPutAndClose-v1": "robot_layouts.experts.cells.put_and_close:put_and_close",
+    "CellPutAway-v1": "robot_layouts.experts.cells.put_away:put_away",
+    "CellShiftRing-v1": "robot_layouts.experts.cells.shift_ring:shift_ring",
+    "CellSortCubes-v1": "robot_layouts.experts.cells.sort_cubes:sort_cubes",
     "DrawTriangle-v1": "robot_layouts.experts.maniskill.draw_triangle:draw_outline",
     "FourRobotStack-v1": "robot_layouts.experts.originals.four_robot_stack:stack_for_four",
     "LiftPegUpright-v1": "robot_layouts.experts.maniskill.lift_peg_upright:stand_up",

@@ -22,6 +22,7 @@ from robots import TaskError, unknown_name_message
 from tasks.arrays import array_of
 
 RECONFIGURE = "reconfigure"  # option of a reset, and in its info: whether worlds are rebuilt
+INSTRUCTION = "instruction"  # in info, of tasks that have several: what is to be done
 ELAPSED = "elapsed_steps"  # in info: control steps since the reset
 SEED = "seed"  # in the info of interfaces: what the random streams began with
 SUCCESS = "is_success"  # there, too: what other packages call success

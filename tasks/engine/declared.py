@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
 from functools import lru_cache
 from types import FunctionType
@@ -22,6 +22,7 @@ from robot_layouts.simulation import Camera, PhysicsSettings
 from robots import TaskError
 from tasks.engine.task import DENSE_MODES, Task
 from tasks.language.bodies import Body, Table, WideTable
+from tasks.language.stages import check_stages
 from tasks.randomization.declaration import Randomization
 
 HOOKS = {
@@ -70,7 +71,14 @@ _NEEDED: dict[str, tuple[Callable[[Any], bool], str]] = {
         lambda given: _is_row(given, str),
         "a tuple of names is needed, such as ('*tcp_pose',) with its comma",
     ),
-    "instruction": (lambda given: isinstance(given, str), "a sentence is needed"),
+    "instruction": (
+        lambda given: isinstance(given, str) or (_is_row(given, str) and bool(given)),
+        "a sentence is needed, or a tuple of some that say the same",
+    ),
+    "varied": (
+        lambda given: isinstance(given, Mapping),
+        "axes of a tasks.Randomization are needed, such as {'mass': {'cube': Uniform(0.5, 2)}}",
+    ),
     "cameras": (
         lambda given: _is_row(given, Camera, list),
         "a tuple of tasks.Camera is needed, such as (Camera((0.3, 0, 0.6), (0, 0, 0.1)),) with its"
@@ -176,6 +184,7 @@ def _check_attributes(cls: type[Task]) -> None:
             f"{task}.reward_modes has {cls.reward_modes[0]!r}, but it does not define"
             f" dense_reward(self, state, action, info){_meant(cls, 'dense_reward')}"
         )
+    check_stages(task, cls.stages)
     checked_whole(f"{task}.max_episode_steps", cls.max_episode_steps, 1, _STEPS, TaskError)
     checked_number(f"{task}.max_reward", cls.max_reward, 1e-6, 1e6, TaskError)
     checked_whole(f"{task}.first_seed", cls.first_seed, 0, 2**32 - 1, TaskError)

@@ -21,6 +21,7 @@ from tasks.engine.actions import ActionReader
 from tasks.engine.cameras import camera_for_people
 from tasks.engine.checks import (
     ELAPSED,
+    INSTRUCTION,
     ReturnedArrays,
     ReturnedReward,
     check_info,
@@ -47,6 +48,7 @@ from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario
 from tasks.engine.task import Info, Memory, Task
 from tasks.engine.touch import Touch, touch_links
 from tasks.language.randomness import EpisodeRandom
+from tasks.language.stages import PassedStages
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.randomization.distractors import add_distractors, area_of
 from tasks.randomization.randomizer import Randomizer
@@ -189,6 +191,9 @@ class TaskEnv(Remade):
         )
         task.simulation = self._simulation
         self._speeds = SpeedWatch(self._simulation)
+        self._progress = PassedStages(task.stages, self.num_envs) if task.stages else None
+        self._phrasings = np.array(task.instruction if isinstance(task.instruction, tuple) else ())
+        self._tells = self._progress is not None or len(self._phrasings) > 0
         if scenario.randomization:
             self._randomizer = Randomizer(
                 scenario.randomization,
@@ -337,7 +342,11 @@ class TaskEnv(Remade):
         """
         obs, reward, terminated, truncated, info = self.advance(action, env_ids)
         observed = _tensor(obs) if isinstance(obs, np.ndarray) else _tensors(obs)
-        details = dict(zip(info, map(_tensor, info.values()), strict=True))
+        details = (
+            _tensors(info)
+            if self._tells
+            else dict(zip(info, map(_tensor, info.values()), strict=True))
+        )
         return observed, _tensor(reward), _tensor(terminated), _tensor(truncated), details
 
     def advance(
@@ -474,6 +483,7 @@ class TaskEnv(Remade):
         if self._randomizer is not None:
             for i in ids:
                 self._randomizer.begin(i, self._rngs[i].stream)
+                self._rngs[i].spread = self._randomizer.spread(i)
 
     def _begin(self, ids: list[int], *, reconfigured: bool) -> tuple[Any, Info]:
         task = self.task
@@ -487,6 +497,8 @@ class TaskEnv(Remade):
         if reconfigured:
             self._camera = None
         self._elapsed[ids] = 0
+        if self._progress is not None:
+            self._progress.begin(ids)
         self._speeds.begin(ids)
         state = self._read()
         if self._randomizer is not None and self._randomizer.scatter(self.simulation, state, ids):
@@ -531,6 +543,15 @@ class TaskEnv(Remade):
         info: Info = {ELAPSED: self._elapsed.copy(), **judged}
         if (modes := self.simulation.modes) is not None:
             info |= {f"{arm}.shortfall": rows.copy() for arm, rows in modes.shortfalls.items()}
+        return self._told(info) if self._tells else info
+
+    def _told(self, info: Info) -> Info:
+        """Return info with how far the episodes have come, and what is to be done in them."""
+        if self._progress is not None:
+            info |= self._progress.told(info)
+        if len(self._phrasings):
+            numbers = [(rng.seed + rng.resets) % len(self._phrasings) for rng in self._rngs]
+            info[INSTRUCTION] = self._phrasings[numbers]
         return info
 
     def _with_touch(self, parts: Mapping[str, Array], state: State) -> dict[str, Array]:
@@ -584,4 +605,4 @@ def _tensors(tree: Any) -> Any:
     """Return arrays, or mappings of them, as users get them: tensors that share their memory."""
     if isinstance(tree, dict):
         return {key: _tensors(value) for key, value in tree.items()}
-    return _tensor(tree)
+    return tree if tree.dtype.kind == "U" else _tensor(tree)  # texts stay an array

@@ -192,7 +192,7 @@ class ScenarioFields(TypedDict, total=False):
     simulator: str
     check_layout: bool
     bystanders: str | None
-    randomization: Randomization | None
+    randomization: Randomization | str | None
     sensor_configs: Mapping[str, Any] | None
     human_render_camera_configs: Mapping[str, Any] | None
     enable_shadow: bool

@@ -18,7 +18,7 @@ from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
 from tasks.language.fitting import AS_DECLARED, Fit
 from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
-from tasks.randomization.declaration import Randomization
+from tasks.randomization.declaration import SETTINGS, Randomization
 from tasks.randomization.distributions import Distribution, Normal
 from tasks.randomization.noise import noise
 from tasks.randomization.randomizer import Randomizer
@@ -28,6 +28,7 @@ Info = dict[str, Any]
 DENSE_MODES = ("normalized_dense", "dense", "sparse", "none")
 SPARSE_MODES = ("sparse", "none")
 _NORMAL = Normal(1.0)
+_FIXED: Mapping[str, Any] = {"spread": 0.0}
 
 
 class Memory(SimpleNamespace):
@@ -100,7 +101,14 @@ class Task:
         viewpoint: Camera position and target of `render` (m, world).
         cameras: Cameras that observe, where images are asked for; those of the robots come after.
         instruction: What is to be done, in a sentence, for robots that are told so; the beginning
-            of the class's docstring if empty.
+            of the class's docstring if empty. Of several, seed ``k`` tells the one numbered ``k``
+            modulo their number; info has it as ``instruction``.
+        stages: How far an episode has come: names of flags that `evaluate` returns, in the order in
+            which they are passed, and the score that each is worth, rising to ``"success": 1.0``.
+            Info has the number of those passed, the name and the score of the last one. They belong
+            to the episode, as its elapsed steps do; none if empty.
+        varied: What the setting ``randomization="varied"`` varies, by axis, as
+            `tasks.Randomization` takes it; see `setting`.
         sensed: Which parts of `observe` a real robot knows, so that they are observed beside
             images; the others are privileged. ``*`` stands for any letters.
         scenario: A fresh scenario of the class at every access; in methods, the one that the
@@ -144,7 +152,9 @@ class Task:
         (0.0, 0.0, 0.35),
     )
     cameras: ClassVar[tuple[Camera, ...]] = (Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)),)
-    instruction: ClassVar[str] = ""
+    instruction: ClassVar[str | tuple[str, ...]] = ""
+    stages: ClassVar[Mapping[str, float]] = {}
+    varied: ClassVar[Mapping[str, Any]] = {}
     sensed: ClassVar[tuple[str, ...]] = ("*tcp_pose",)
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -154,6 +164,23 @@ class Task:
         if "reward_modes" not in cls.__dict__:
             dense = cls.dense_reward is not Task.dense_reward
             cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
+
+    @classmethod
+    def setting(cls, name: str) -> Randomization | None:
+        """Return what varies in a setting of the task, by how hard that makes it.
+
+        Args:
+            name: ``"fixed"``: nothing, every body begins in the middle of its area; ``"spread"``:
+                only what the task itself draws; ``"varied"``: what the class declares as well.
+
+        Raises:
+            UnknownNameError: If there is no such setting.
+        """
+        known = SETTINGS if cls.varied else SETTINGS[:2]
+        if name not in known:
+            raise UnknownNameError(f"setting of {cls.__name__}", name, known)
+        axes = (_FIXED, {}, cls.varied)[known.index(name)]
+        return Randomization(**axes) if axes else None
 
     def design(self, rng: EpisodeRandom) -> Any:
         """Draw the geometry of one environment; `build` finds it as ``world.design``."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from robots import TaskError, unknown_name_message
 from tasks.description import instruction_of
-from tasks.engine.checks import RECONFIGURE, SUCCESS
+from tasks.engine.checks import INSTRUCTION, RECONFIGURE, SUCCESS
 from tasks.engine.remade import Remade
 from tasks.interfaces.vector import UnknownAttributeError, VectorTask
 from tasks.registry import get_task_class
@@ -70,6 +70,8 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
             "task": cls.task_id,
             "task_description": instruction or instruction_of(cls),
         }
+        self._told = instruction is None and isinstance(cls.instruction, tuple)
+        self._instructions = [self._shared["task_description"]] * num_envs
         self._terminated, self._truncated, self._solved = np.zeros((3, num_envs), bool)
 
     def reset(
@@ -95,6 +97,9 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
         begun = (options or {}).get("reset_mask", slice(None))
         for flags in (self._terminated, self._truncated, self._solved):
             flags[begun] = False
+        if self._told:
+            told = zip(info[INSTRUCTION].tolist(), self._instructions, strict=True)
+            self._instructions = [new or old for new, old in told]
         return renamed(observation), info
 
     def step(
@@ -148,6 +153,8 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
             return self.render() if self.render_mode else (_NOTHING,) * self.num_envs
         if name not in self._shared:
             raise UnknownAttributeError("attribute", name, [*self._shared, "render"])
+        if name == "task_description":
+            return tuple(self._instructions)
         return (self._shared[name],) * self.num_envs
 
     def get_attr(self, name: str) -> tuple[Any, ...]:

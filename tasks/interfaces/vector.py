@@ -481,7 +481,7 @@ class _Results:
         for key, array in self._entries(prefix):
             info[key] = array[ids].copy()
             if not everywhere:
-                info[key][~mask] = 0
+                info[key][~mask] = np.zeros((), array.dtype)  # of texts, none
             info[f"_{key}"] = mask.copy()
         return info
 

@@ -59,10 +59,12 @@ class EpisodeRandom:
         resets: How many resets without a seed came since then.
         numpy: Stream for joint noise.
         torch: Stream for objects and goals.
+        spread: Share of the ways between bounds, about their middles, on which numbers lie.
     """
 
     seed: int
     resets: int
+    spread: float = 1.0
     numpy: np.random.RandomState
     torch: torch.Generator
 
@@ -123,7 +125,11 @@ class EpisodeRandom:
                 "rng.uniform_between takes the lower bounds and the upper ones, as many:"
                 f" ([low, …], [high, …]); given: {low}, {high}"
             )
-        return self.uniform(1, len(low))[0] * (highest - lowest) + lowest
+        drawn = self.uniform(1, len(low))[0] * (highest - lowest) + lowest
+        if self.spread == 1.0:
+            return drawn
+        middle = (lowest + highest) / 2
+        return middle + self.spread * (drawn - middle)
 
     def torch_normal(self, std: float, count: int) -> Tensor:
         """Draw ``count`` float32 numbers of mean 0 from the torch stream (unit of ``std``)."""
@@ -165,6 +171,8 @@ class EpisodeRandom:
             high: Largest angle (rad).
         """
         angle = self.uniform(1, 3)[0, 2] * (high - low) + low
+        if self.spread != 1.0:
+            angle = (low + high) / 2 + self.spread * (angle - (low + high) / 2)
         cos, sin = torch.cos(angle), torch.sin(angle)
         w_squared, z_squared = 1.0 + cos + cos + 1.0, 1.0 - cos - cos + 1.0
         w, z = sqrt(w_squared), sqrt(z_squared)

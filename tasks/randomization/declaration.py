@@ -22,6 +22,7 @@ from tasks.randomization.distributions import Distribution
 from tasks.randomization.groups import Declared, Group, Limits
 from tasks.randomization.looks import CameraShift, Light, Surface, Texture
 
+SETTINGS = ("fixed", "spread", "varied")  # of tasks, from easy to hard
 MAX_LENGTH = 1 << 18  # bytes of a file
 MAX_DEPTH = 16  # of mappings and lists inside one another
 
@@ -84,6 +85,7 @@ _COEFFICIENT = Limits(0.0, 1e3, "coefficient of friction")
 _STEPS = Limits(0, 1000, "control steps", whole=True)
 _NOISE = Limits(-inf, inf, "added to the number")
 _SIZE = Limits(0.01, 100.0, "factor on what is declared")
+_SHARE = Limits(0.0, 1.0, "share of what is declared")
 _GRAVITY = Limits(0.0, 1000.0, "m/s²")
 
 
@@ -124,6 +126,8 @@ class Randomization:
         colors: What a body, a robot or a link is painted with.
         textures: Which pattern covers a body; the colour of one that has both is the pattern's.
         distractors: Bodies that have nothing to do with the task; see `Distractors`.
+        spread: Share of its area within which each body of the task begins, and of the angles by
+            which it is turned: with 0 all begin in the middle.
         action_noise: Added to the action numbers of a robot, or of a joint group, anew at every
             step, in the unit of the numbers.
         action_delay: After how many control steps actions arrive; until the first does, joints
@@ -147,6 +151,7 @@ class Randomization:
     colors: Mapping[str, Surface] = _axis(Surface)
     textures: Mapping[str, Texture] = _axis(Texture)
     distractors: Distractors | None = _axis(Distractors, named=False)
+    spread: Distribution | None = _axis(_SHARE, named=False)
     action_noise: Mapping[str, Distribution] = _axis(_NOISE)
     action_delay: Distribution | None = _axis(_STEPS, named=False)
     sensor_noise: Mapping[str, Distribution] = _axis(_NOISE)

@@ -103,6 +103,10 @@ class Randomizer:
         """Return the layout as robots stand in the present episode of an environment."""
         return self._standing[env]
 
+    def spread(self, env: int) -> float:
+        """Return the share of its area within which each body begins in an environment."""
+        return self._drawn[env].get("spread", 1.0)
+
     def scale(self, body: str) -> Floats:
         """Return the factor on the size of a body in each environment, (N,)."""
         scales = [self._scales(drawn).get(body, 1.0) for drawn in self._drawn]

@@ -297,6 +297,14 @@ def test_texts_come_from_whoever_says_them(tmp_path):
     assert texts == [["Slide it"]] * 3
 
 
+def test_the_seed_chooses_among_a_task_s_phrasings(tmp_path):
+    path = record(tmp_path / "put.h5", "CellPutAndClose-v1", [1, 1, 1])  # of seeds 10, 11, 12
+    export(Export(path, "lerobot", tmp_path / "out", include_failures=True))
+    texts = pq.read_table(tmp_path / "out/meta/episodes").to_pydict()["tasks"]
+    phrasings = tasks.get_task_class("CellPutAndClose-v1").instruction
+    assert texts == [[phrasings[1]], [phrasings[2]], [phrasings[0]]]
+
+
 class Spoken(tasks.get_task_class("PushT-v1")):
     """Push something."""
 

@@ -30,7 +30,7 @@ FAILURES_OF_10 = {"PickCubeSO100-v1": 2}  # 0 of the others
 EXPERTS = list_experts()
 CLONED = [name for name in EXPERTS if name in tasks.list_clones()]
 EPISODES = [(name, seed) for name in EXPERTS for seed in seeds(name)]
-FIRST = [(name, seeds(name)[0]) for name in EXPERTS]
+FIRST = [(name, seeds(name)[0]) for name in EXPERTS if not name.startswith("Cell")]
 
 
 @pytest.mark.parametrize(("name", "seed"), quick_cases(EPISODES, FIRST))

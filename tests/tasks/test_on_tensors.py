@@ -8,6 +8,7 @@ import torch
 
 import tasks
 from robot_layouts.simulation import State
+from tasks.language.stages import PassedStages
 
 STEPS, ENVS = 12, 3
 
@@ -53,6 +54,10 @@ def outcome(task, state, action, memory):
     """Return what a task says of a state, and the memory that it leaves."""
     task.memory = memory
     info = dict(task.evaluate(state))
+    if task.stages:  # the engine's part of info, which a reward may take
+        flags = {name: np.asarray(torch.Tensor(info[name]).bool()) for name in task.stages}
+        told = PassedStages(task.stages, ENVS).told(flags)["stage_score"]
+        info["stage_score"] = told if isinstance(state.full(0.0), np.ndarray) else on_tensors(told)
     said = {"info": info, "observation": dict(task.observe(state, info))}
     if "dense" in task.reward_modes:
         said["reward"] = task.dense_reward(state, action, info)

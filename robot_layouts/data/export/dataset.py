@@ -377,7 +377,11 @@ class _Work:
         if isinstance(given, Mapping):
             given = given.get(trajectory.episode_id)
         said = given or (trajectory.source or {}).get("instruction")
-        return said if isinstance(said, str) else self._instruction if self.seen else None
+        if isinstance(said, str):
+            return said
+        cls = self.reader.task.task_class
+        several = isinstance(cls.instruction, tuple)
+        return instruction_of(cls, trajectory.seed or 0) if several or self.seen else None
 
     def writer(self, folder: Path) -> DatasetWriter:
         """Return what writes the episodes."""

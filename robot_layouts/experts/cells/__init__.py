@@ -1,0 +1,1 @@
+"""Experts of the cells of `tasks.cells`: short scripts of the same few moves."""

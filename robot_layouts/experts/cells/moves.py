@@ -1,0 +1,247 @@
+"""What the experts of cells share: taking a body along and putting it down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from robot_layouts.experts.geometry import backed_off, turn, yaw_of
+from robot_layouts.experts.grasps import PLACE_YAWS, bringing, cube_grips, held_at, lowerable, pick
+from robot_layouts.experts.reaching import reaching
+from robot_layouts.experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
+from robot_layouts.experts.tips import pose_solver
+from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate
+from tasks import TaskEnv
+
+Grips = Callable[[Scene], Sequence[Pose]]
+Place = Callable[[Scene], Floats]
+"""Where the origin of a body is to be, (3,) (m, world), given the scene."""
+
+MOST_GRIPS = 6
+FREE, BEYOND = 0.08, -0.02  # before a handle, and beyond it so that it is pushed home (m)
+TILTS = tuple(np.radians((0, 20, 35, 50)))  # of grippers that hold cubes, from straight down
+READY = 0.03  # rad: so near a gripper comes to its place above a body before it goes down
+
+
+def cube_holds(body: str, up: float = 0.0) -> Grips:
+    """Return the grips of a cube, or of another body of that cross section, from above.
+
+    Args:
+        body: The body.
+        up: How far above its origin it is held (m).
+    """
+
+    def grips(scene: Scene) -> list[Pose]:
+        position, quaternion = scene.body(body)
+        cube = position + (0.0, 0.0, up), quaternion
+        return [grip for tilt in TILTS for grip in cube_grips(cube, tilt=tilt)]
+
+    return grips
+
+
+def carriable(
+    task: TaskEnv, robot: str, body: str, grips: Grips, place: Place, above: float
+) -> Grips:
+    """Return those of some grips of a body with which an arm can put it down somewhere.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm.
+        body: The body.
+        grips: The grips, given the scene; the steepest are tried first.
+        place: Where the body is to be.
+        above: How far above both places the gripper has to get as well (m).
+    """
+    solver = pose_solver(task, robot)
+
+    def reachable(position: Floats, quaternion: Floats, qpos: Floats) -> bool:
+        places = (position, position + (0.0, 0.0, above))
+        return all(solver.solve(at, quaternion, qpos) is not None for at in places)
+
+    def brings(scene: Scene, grip: Pose) -> bool:
+        qpos, (start, _) = scene.qpos(robot), scene.body(body)
+        if not reachable(*grip, qpos):
+            return False
+        arm, end = grip[0] - start, place(scene)
+        turned = (turn("z", yaw) for yaw in PLACE_YAWS)
+        return any(
+            reachable(end + rotate(yaw, arm), multiply(yaw, grip[1]), qpos) for yaw in turned
+        )
+
+    def kept(scene: Scene) -> list[Pose]:
+        steepest = sorted(grips(scene), key=_steepness)
+        return [*islice((grip for grip in steepest if brings(scene, grip)), MOST_GRIPS)]
+
+    return kept
+
+
+def _steepness(grip: Pose) -> float:
+    return float(rotate(grip[1], np.array([0.0, 0.0, 1.0]))[2])
+
+
+def carry(
+    task: TaskEnv,
+    robot: str,
+    body: str,
+    grips: Grips,
+    place: Place,
+    *,
+    height: float = 0.12,
+    drop: float = 0.002,
+    back: float = 0.2,
+    ready: float = READY,
+    yaws: Sequence[float] = PLACE_YAWS,
+    turn_of: Sequence[str] = (),
+    taking: Sequence[str] = (),
+    **picking: Any,
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints with which an arm takes a body and puts it down elsewhere.
+
+    They are those of `pick`, then ``lift``, ``over``, ``lower``, ``release``, ``rise`` and
+    ``retreat``, each with the body's name.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm.
+        body: The body.
+        grips: The gripper's poses to choose from.
+        place: Where the body's origin is to be.
+        height: How high it is lifted, and how far above its place it is before it goes down (m).
+        drop: How far above its place it is let go (m).
+        back: How far the hand goes back towards its base then (m).
+        ready: As `pick` takes it (rad).
+        yaws: How it may turn about the vertical on its way (rad).
+        turn_of: Waypoints of other arms that come before it is brought.
+        taking: Those that come before it is taken.
+        picking: Other arguments of `pick`.
+    """
+    grips = carriable(task, robot, body, grips, place, height)
+
+    def retreat(scene: Scene) -> list[Pose]:
+        position, quaternion = scene.tcp(robot)
+        outward = (scene.base(robot) - position) * (1.0, 1.0, 0.0)
+        return [(position + back * outward / np.linalg.norm(outward), quaternion)]
+
+    def lift(scene: Scene) -> list[Pose]:
+        return [(scene.tcp(robot)[0] + (0.0, 0.0, height), scene.tcp(robot)[1])]
+
+    def at(scene: Scene, up: float, yaws: Sequence[float]) -> list[Pose]:
+        return held_at(scene, robot, body, place(scene) + (0.0, 0.0, up), yaws)
+
+    over = lowerable(task, robot, partial(at, up=height, yaws=yaws), height - drop)
+    above, *others = pick(robot, body, grips, ready=ready, **picking)
+    return (
+        replace(above, after=tuple(taking)),
+        *others,
+        Waypoint(f"lift {body}", lift, CLOSED),
+        Waypoint(f"over {body}", over, CLOSED, after=tuple(turn_of), near=0.03),
+        Waypoint(f"lower {body}", partial(at, up=drop, yaws=(0.0,)), CLOSED, near=0.02),
+        Waypoint(f"release {body}", None, OPEN, steps=3),
+        Waypoint(f"rise {body}", lambda scene: [backed_off(scene.tcp(robot), height)], OPEN),
+        Waypoint(f"retreat {body}", retreat, OPEN, near=0.1),
+    )
+
+
+def lift_together(
+    body: str,
+    grips: Mapping[str, Grips],
+    height: float,
+    *,
+    legs: int = 4,
+    near: float = 0.04,
+    **picking: Any,
+) -> dict[str, tuple[Waypoint, ...]]:
+    """Return the script with which arms take a body and raise it level, step by step together.
+
+    Args:
+        body: What they lift.
+        grips: By arm, the gripper's poses to choose from.
+        height: How far it is raised (m).
+        legs: In how many steps; between them the arms' joints go straight, not the body.
+        near: How near each arm must come to the end of a step before the next (rad).
+        picking: Other arguments of `pick`.
+    """
+    start: list[Pose] = []
+
+    def raised(scene: Scene, robot: str, share: float) -> list[Pose]:
+        if not start:  # all of them hold it now
+            start.append(scene.body(body))
+        position, quaternion = start[0]
+        level = turn("z", yaw_of(quaternion))
+        return [bringing(scene, robot, body, (position + (0.0, 0.0, share * height), level))]
+
+    def before(robot: str, step: int) -> tuple[str, ...]:
+        name = f"raise {step - 1}" if step else f"grasp {body}"
+        return tuple(f"{other}.{name}" for other in grips if other != robot)
+
+    return {
+        robot: (
+            *pick(robot, body, own, **picking),
+            *(
+                Waypoint(
+                    f"raise {i}",
+                    partial(raised, robot=robot, share=(i + 1) / legs),
+                    CLOSED,
+                    after=before(robot, i),
+                    near=near,
+                )
+                for i in range(legs)
+            ),
+        )
+        for robot, own in grips.items()
+    }
+
+
+def push_shut(
+    task: TaskEnv,
+    robot: str,
+    body: str,
+    *,
+    handle: Floats,
+    height: float,
+    after: Sequence[str] = (),
+    strokes: int = 6,
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints with which a tip pushes the drawer of a case shut by its handle.
+
+    They are ``before``, ``down``, ``shut 0`` … and ``back``, each with the body's name.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm; its fingers stay closed, if it has some.
+        body: The case, whose joint is called ``drawer`` and opens along its x axis.
+        handle: Where the handle is with the drawer shut, in the case's frame, (3,) (m).
+        height: Of the tip over the table (m).
+        after: Waypoints of other arms that come before.
+        strokes: In how many parts it pushes.
+    """
+    go = partial(reaching, task, robot, leans=(0.0, 0.3, 0.6), as_it_is=False, gripper=CLOSED)
+
+    def at(scene: Scene, out: float, up: float) -> Floats:
+        """The place so far (m) before the handle as it is with the drawer shut."""
+        place, quaternion = scene.body(body)
+        x, y, _ = place + rotate(quaternion, handle + (out, 0.0, 0.0))
+        return np.array([x, y, up])
+
+    def free(scene: Scene, up: float) -> Floats:
+        return at(scene, scene.joints(body)["drawer"] + FREE, up)
+
+    def shut(scene: Scene, left: int) -> Floats:
+        place, quaternion = scene.body(body)
+        tip = rotate(inverse(quaternion), scene.tcp(robot)[0] - place)[0] - handle[0]
+        return at(scene, tip - (tip - BEYOND) / left, height)
+
+    return (
+        go(f"before {body}", partial(free, up=height + 0.12), near=0.05, after=tuple(after)),
+        go(f"down {body}", partial(free, up=height), near=0.03),
+        *(
+            go(f"shut {body} {i}", partial(shut, left=strokes - i), near=0.03)
+            for i in range(strokes)
+        ),
+        go(f"back {body}", partial(at, out=FREE, up=height), near=0.1),
+    )
