@@ -60,12 +60,11 @@ from tasks.description import (
     read_docstring,
 )
 from tasks.engine.cameras import cameras_of
-from tasks.registry import CATALOGUE, other_names
+from tasks.registry import CATALOGUE as TASKS
+from tasks.registry import other_names
 
 FOLDER, RECORD = DOCS / "gallery", DOCS / "gallery.json"
 WRITE = "python -m benchmarks gallery"
-# Cells are on a page of their own, docs/cells.md, with what `tasks check` says of them.
-TASKS = [name for name, target in CATALOGUE.items() if not target.startswith("tasks.cells.")]
 EPISODES = 25  # that each expert plays, of the first seeds
 PACKAGES = ("robot-layouts", "sapien", "torch", "numpy")
 RATES = ("step", "reset", "vector")  # benchmarks by task that compare with native

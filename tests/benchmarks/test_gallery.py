@@ -13,7 +13,7 @@ from benchmarks.__main__ import main
 from benchmarks.bench.measurement import number_text
 from benchmarks.bench.report import read_report
 from benchmarks.gallery import pages as gallery
-from benchmarks.gallery.pages import FOLDER, TASKS, _read, all_pages, complaints, solved
+from benchmarks.gallery.pages import FOLDER, _read, all_pages, complaints, solved
 from benchmarks.gallery.pictures import (
     BACKGROUND,
     LARGEST_CLIP,
@@ -25,6 +25,7 @@ from benchmarks.records import RecordError
 from parity.results import read_results
 from robots import RobotRegistry
 from robots.registry import CATALOGUE as ROBOTS
+from tasks.registry import CATALOGUE as TASKS
 
 LARGEST_GALLERY = 8_000_000  # bytes
 LINK = re.compile(r"\]\(([^)#]+)\)")

@@ -113,7 +113,8 @@ def test_the_hash_is_of_the_content_of_layouts(whole):
     assert load_suite(whole).hash != before.hash
 
 
-NEWER = {"TwoRobotHandOver-v1"}  # than the suite, which never changes
+# Newer than the suite, which never changes.
+NEWER = {"TwoRobotHandOver-v1", *(name for name in CATALOGUE if name.startswith("Cell"))}
 
 
 def test_the_standard_suite():
