@@ -9,7 +9,7 @@ from tasks import CellTask, EpisodeRandom, Object, State, World, register_task
 from tasks.maths import Array, Floats
 
 SHUT = 0.01  # of a drawer (m)
-AREA = ([0.2, -0.12], [0.29, 0.12])  # of a case, from the middle towards its arm, and aside (m)
+AREA = ([0.235, -0.12], [0.3, 0.12])  # of a case, from the middle towards its arm, and aside (m)
 SIDES = {"first": (0.0, -1.0), "second": (0.866, 0.5), "third": (-0.866, 0.5)}
 OPENED = {"drawer": (0.07, 0.12)}  # m, in a case of full size
 TURN = 0.25  # rad
@@ -19,8 +19,8 @@ TURN = 0.25  # rad
 class CellCloseDrawers(CellTask):
     """Close all drawers, each arm the one before it.
 
-    The cases stand back to back, their fronts towards the arms, 20 to 29 cm from the middle, up to
-    12 cm aside and turned by up to 14°; the drawers are open by 6 to 10 cm.
+    The cases stand back to back, their fronts towards the arms, 24 to 30 cm from the middle, up to
+    12 cm aside and turned by up to 14°; the drawers are open by 5 to 9 cm.
 
     Success: no drawer is open by more than 1 cm.
     """
@@ -36,9 +36,9 @@ class CellCloseDrawers(CellTask):
     stages = {"is_one_near": 0.2, "is_one_shut": 0.5, "are_two_shut": 0.75, "success": 1.0}
     viewpoint = ((1.4, 1.1, 1.2), (0.0, 0.0, 0.1))
 
-    case_first = Object("drawer", kind="kinematic", scale=0.75, joints=OPENED)
-    case_second = Object("drawer", kind="kinematic", scale=0.75, joints=OPENED)
-    case_third = Object("drawer", kind="kinematic", scale=0.75, joints=OPENED)
+    case_first = Object("drawer", kind="kinematic", scale=0.77, joints=OPENED)
+    case_second = Object("drawer", kind="kinematic", scale=0.77, joints=OPENED)
+    case_third = Object("drawer", kind="kinematic", scale=0.77, joints=OPENED)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Stand the cases, their drawers open."""
