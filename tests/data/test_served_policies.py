@@ -2,6 +2,7 @@
 
 import pickle
 import re
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -155,7 +156,7 @@ def test_keys_say_what_is_sent_and_what_actions_become(two_arms, tmp_path):
     keys = Keys(load_keys(file), two_arms)
     observation, _ = two_arms.reset(seed=3)
     observation["agent"]["panda_wristcam-0"]["qpos"][0, 7:] = 0.01  # m, of 0.04
-    sent = keys.sent(observation)
+    sent = keys.sent(observation, 3)
     qpos = [observation["agent"][f"panda_wristcam-{i}"]["qpos"][0].numpy() for i in range(2)]
     fingers = [1 - q[7:8] / np.float32(0.04) for q in qpos]
     assert np.ravel(fingers) == pytest.approx([0.75, 0.0], abs=1e-6)
@@ -187,14 +188,14 @@ def test_presets_are_the_conventions_of_openpi(two_arms):
     with pytest.raises(TaskError, match="'droid' are of one robot; the task has left, right"):
         PRESETS["droid"](two_arms)
     observation, _ = two_arms.reset(seed=0)
-    sent = Keys({**PRESETS["aloha"](two_arms), "control_mode": None}, two_arms).sent(observation)
+    sent = Keys({**PRESETS["aloha"](two_arms), "control_mode": None}, two_arms).sent(observation, 0)
     assert sent["state"].shape == (16,)
     assert {name: image.shape for name, image in sent["images"].items()} == {
         name: (3, 128, 128) for name in ("cam_high", "cam_left_wrist", "cam_right_wrist")
     }
     env = tasks.make("PickCube-v1", robots={"arm": "panda_wristcam"}, obs_mode="rgb")
     observation, _ = env.reset(seed=0)
-    sent = Keys(PRESETS["droid"](env), env).sent(observation)
+    sent = Keys(PRESETS["droid"](env), env).sent(observation, 0)
     assert {key: getattr(value, "shape", None) for key, value in sent.items()} == {
         "observation/exterior_image_1_left": (128, 128, 3),
         "observation/wrist_image_left": (128, 128, 3),
@@ -215,6 +216,19 @@ def test_without_keys_everything_is_sent(tmp_path, monkeypatch):
     assert sent["agent/qpos"].shape == (9,)
     assert sent["extra/is_grasped"].dtype == bool
     assert sent["prompt"].endswith(".")
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_instruction_is_the_one_of_the_seed(tmp_path, monkeypatch, seed):
+    with closing(tasks.make("CellPressTogether-v1", obs_mode="state_dict")) as env:
+        told = env.reset(seed=seed)[1]["instruction"][0]
+        width = env.layout.action_dim
+    monkeypatch.setenv("SERVED_FILE", str(tmp_path / "sent"))
+    monkeypatch.setenv("SERVED_ACTIONS", str(width))
+    with server("tests.data.served:Writes") as address:
+        making = {"obs_mode": "state_dict", "max_episode_steps": 1}
+        evaluate(address, "CellPressTogether-v1", [seed], workers=0, **making)
+    assert pickle.loads((tmp_path / "sent").read_bytes())["prompt"] == told
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,7 @@ from robot_layouts.data.playing.policies import (
     waits_of,
 )
 from robot_layouts.data.playing.scheduler import Event
+from robot_layouts.data.playing.served.client import PolicyClient
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.registry import Expert
 from robots import ActionError, TaskError
@@ -432,11 +433,11 @@ class Casting:
         cast = self._cast
         return EpisodePlayer(
             seed,
-            _fresh(cast.policy),
+            _fresh(cast.policy, seed),
             self._env.max_episode_steps,
             random_states(),
-            takeover=_fresh(cast.takeover),
-            corrector=_fresh(cast.corrector),
+            takeover=_fresh(cast.takeover, seed),
+            corrector=_fresh(cast.corrector, seed),
         )
 
     def close(self) -> None:
@@ -466,8 +467,10 @@ def _ends_at_last(episode: PlayedEpisode) -> bool:
     return not (episode.terminated | episode.truncated)[:-1].any()
 
 
-def _fresh(policy: Any) -> Any:
+def _fresh(policy: Any, seed: int) -> Any:
     """Return a copy of a policy as it was passed; people and what is batched are not copied."""
+    if isinstance(policy, PolicyClient):
+        return policy.episode(seed)
     return policy if is_batched(policy) or is_person(policy) else deepcopy(policy)
 
 

@@ -161,20 +161,25 @@ class PolicyClient:
         waits: How long each answer took (s).
     """
 
-    def __init__(self, keys: Keys, connection: Connection) -> None:
+    def __init__(self, keys: Keys, connection: Connection, seed: int = 0) -> None:
         """Begin an episode.
 
         Args:
             keys: What is sent and received.
             connection: To the server.
+            seed: Of the episode, which chooses among several instructions.
         """
-        self._keys, self._connection = keys, connection
+        self._keys, self._connection, self._seed = keys, connection, seed
         self._ahead: list[NDArray[np.float32]] = []
         self.waits: list[float] = []
 
     def __deepcopy__(self, memo: Any) -> PolicyClient:
-        """Return what plays another episode."""
-        return PolicyClient(self._keys, self._connection)
+        """Return what plays another episode of the same seed."""
+        return self.episode(self._seed)
+
+    def episode(self, seed: int) -> PolicyClient:
+        """Return what plays the episode of a seed."""
+        return PolicyClient(self._keys, self._connection, seed)
 
     def __call__(self, observation: Any) -> NDArray[np.float32]:
         """Return the action for an observation of one environment, (A,).
@@ -183,7 +188,7 @@ class PolicyClient:
             PolicyServerError: If the server gives none.
         """
         if not self._ahead:
-            answer, seconds = self._connection.ask(self._keys.sent(observation))
+            answer, seconds = self._connection.ask(self._keys.sent(observation, self._seed))
             try:
                 chunk = self._keys.chunk(answer)
             except ValueError as error:

@@ -25,8 +25,9 @@ from tasks.randomization.declaration import read_data
 
 SECONDS = 60.0  # for an answer: a server may compile its network when it is first asked
 _CHW = "chw"
+_TOLD = ""  # beside the paths of an observation: what is to be done
 
-Source = Callable[[Mapping[str, NDArray[Any]]], Any]
+Source = Callable[[Mapping[str, Any]], Any]
 """Observation by path → what is sent under a key."""
 
 
@@ -255,12 +256,17 @@ class Keys:
         given: Any = self._data.get("observation")
         self._sources: dict[str, Any] | None = None if given is None else self._tree(given)
 
-    def sent(self, observation: Any) -> dict[str, Any]:
-        """Return what is sent of an observation of one environment, each part (1, …)."""
-        seen = _by_path(observation)
+    def sent(self, observation: Any, seed: int) -> dict[str, Any]:
+        """Return what is sent in an episode.
+
+        Args:
+            observation: Of one environment, each part (1, …).
+            seed: Of the episode, which chooses among several instructions.
+        """
+        seen, told = _by_path(observation), instruction_of(self._task.task_class, seed)
         if self._sources is None:
-            return {**seen, "prompt": instruction_of(self._task.task_class)}
-        return _filled(self._sources, seen)
+            return {**seen, "prompt": told}
+        return _filled(self._sources, {**seen, _TOLD: told})
 
     def carried_out(self, chunk: NDArray[Any]) -> NDArray[np.float32]:
         """Return a server's actions, (T, A), as the task takes them, those that are carried out."""
@@ -308,8 +314,7 @@ class Keys:
         seen = self._observed()
         if "text" in given:
             text = given["text"]
-            said = instruction_of(self._task.task_class) if text == "instruction" else text
-            return lambda seen: said
+            return _entry(_TOLD) if text == "instruction" else lambda seen: text
         if "entry" in given:
             return _entry(_known("entry of the observation", given["entry"], seen))
         if "camera" in given:
@@ -402,7 +407,7 @@ def _entry(path: str) -> Source:
     return lambda seen: seen[path]
 
 
-def _filled(sources: Mapping[str, Any], seen: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+def _filled(sources: Mapping[str, Any], seen: Mapping[str, Any]) -> dict[str, Any]:
     return {
         key: _filled(source, seen) if isinstance(source, dict) else source(seen)
         for key, source in sources.items()
