@@ -14,7 +14,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate, pairwise
 
-from robots import RobotDescriptor
+from robots import RobotDescriptor, RobotRegistry
+from robots.registry import CATALOGUE as ROBOTS
 
 # Share of the sum of two reaches. ManiSkill's two-robot tasks stand their Pandas 1.5 m apart,
 # which is 0.877 of twice 0.855 m (mani_skill 3.0.1, scene_builder/table).
@@ -24,9 +25,23 @@ HAND_OVER = 7 / 8
 ROUND_CORNERS = 15 / 16
 UNEQUAL = 1 / 2  # of the larger reach; what counts as much less
 SHOULDER = 0.4  # of an arm's reach; how high its first joint is above the ground that it works on
+ARM = 0.3  # m; what reaches less is a hand
 OPPOSITE = (("north", "south"), ("east", "west"))  # edges of a table
 
 Rows = Mapping[str, Sequence[RobotDescriptor]]  # the robots of each edge of a table, in order
+
+
+def is_known_arm(robot: RobotDescriptor) -> bool:
+    """Return whether a robot is an arm of the catalogue that stands on its base.
+
+    Hands are as wide as they reach, and wheels may be lower than the base that they carry.
+    """
+    return in_catalogue(robot) and robot.reach >= ARM and not robot.no_floor_contact
+
+
+def in_catalogue(robot: RobotDescriptor) -> bool:
+    """Return whether a robot is as the catalogue has it."""
+    return robot.name in ROBOTS and RobotRegistry.load(robot.name) == robot
 
 
 def apart(one: RobotDescriptor, other: RobotDescriptor) -> float:

@@ -28,7 +28,16 @@ from inspect import signature
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, TypeGuard, cast
 
-from layouts.distances import apart, centred, gaps, ring_of, share_at_table, table_for
+from layouts.distances import (
+    apart,
+    centred,
+    gaps,
+    in_catalogue,
+    is_known_arm,
+    ring_of,
+    share_at_table,
+    table_for,
+)
 from layouts.frames import EDGES, check_positive
 from layouts.frames import table as table_frames
 from layouts.layout import Layout
@@ -41,11 +50,9 @@ from robots import (
     LayoutError,
     MissingPackageError,
     RobotDescriptor,
-    RobotRegistry,
     UnknownNameError,
 )
 from robots.descriptor import Vector3
-from robots.registry import CATALOGUE as ROBOTS
 
 if TYPE_CHECKING:
     from layouts.validation.findings import Finding
@@ -53,8 +60,6 @@ if TYPE_CHECKING:
 Distance = float | Literal["auto"]  # m
 
 FARTHEST = 3.0  # m; as much farther apart than by their reach robots stand at most
-
-ARM = 0.3  # m; what reaches less is a hand
 
 # Of the shorter reach: how deep within reach of neighbours the places lie that they share, how near
 # the ground they are, both as those of two Pandas; in which steps robots are moved together for
@@ -351,7 +356,7 @@ def _clear(
     Raises:
         LayoutError: If there is none; says why.
     """
-    if not all(map(_is_known, robots.values())):
+    if not all(map(is_known_arm, robots.values())):
         with suppress(AssetError, MissingPackageError):  # else their bodies are not known here
             return _sound(placed, neighbours)
     return placed(0.0)
@@ -359,17 +364,16 @@ def _clear(
 
 def _sound(placed: Callable[[float], Layout], neighbours: Sequence[tuple[str, str]]) -> Layout:
     """See `_clear`."""
-    from layouts.ready import lift, stooped
+    from layouts.ready import grounded
 
-    starts = {name: stooped(placement) for name, placement in placed(0.0).items()}
-    lifts = {name: lift(placement) for name, placement in starts.items()}
+    starts = {name: grounded(placement) for name, placement in placed(0.0).items()}
 
     def raised(more: float) -> Layout:
         layout, places = placed(more), dict[str, Placement]()
         for name, start in starts.items():
-            x, y, z = layout[name].local_pose.position
+            (x, y, _), (_, _, z) = layout[name].local_pose.position, start.local_pose.position
             place = replace(layout[name], keyframe=start.keyframe, qpos=start.qpos)
-            places[name] = replace(place, position=(x, y, z + lifts[name]))
+            places[name] = replace(place, position=(x, y, z))
         return Layout(places, layout.frames)
 
     more = _more_to_share(raised, neighbours)
@@ -380,7 +384,7 @@ def _sound(placed: Callable[[float], Layout], neighbours: Sequence[tuple[str, st
             raise LayoutError(f"no distance keeps these robots apart\n{found[0]}")
         layout = raised(more)
     for finding in _problems(layout, "self-collision", "joint limit", "table", samples=0):
-        if not all(_in_catalogue(layout[name].robot) for name in finding.robots):
+        if not all(in_catalogue(layout[name].robot) for name in finding.robots):
             raise LayoutError(f"no distance makes this layout sound\n{finding}")
     return layout
 
@@ -413,18 +417,6 @@ def _more_to_share(
 def _problems(layout: Layout, *kinds: str, samples: int = 20) -> list[Finding]:
     report = layout.validate(workspaces=False, samples=samples)
     return [finding for finding in report.findings if finding.serious and finding.kind in kinds]
-
-
-def _is_known(robot: RobotDescriptor) -> bool:
-    """Tell whether a robot is an arm of the catalogue that stands on its base.
-
-    Hands are as wide as they reach, and wheels may be lower than the base that they carry.
-    """
-    return _in_catalogue(robot) and robot.reach >= ARM and not robot.no_floor_contact
-
-
-def _in_catalogue(robot: RobotDescriptor) -> bool:
-    return robot.name in ROBOTS and RobotRegistry.load(robot.name) == robot
 
 
 def _is_auto(distance: object) -> TypeGuard[Literal["auto"]]:

@@ -71,6 +71,20 @@ def made_ready(
     return placement
 
 
+def grounded(placement: Placement) -> Placement:
+    """Return the placement of a robot that starts as `stooped`, and is raised by its `lift`.
+
+    Args:
+        placement: The robot, upright.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+    """
+    start = stooped(placement)
+    x, y, z = start.local_pose.position
+    return replace(start, position=(x, y, z + lift(start)))
+
+
 def stooped(placement: Placement) -> Placement:
     """Return the placement of a robot whose torso, if one is driven that slides, starts low enough.
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from layouts.distances import SHOULDER
+from layouts.distances import SHOULDER, is_known_arm
 from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
@@ -33,8 +34,9 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
     """Return a task's layout with other robots, each where it reaches what the task's own does.
 
     A robot stands on the line from the task's own to the middle of what is worked on, as far from
-    it as its reach asks for, turned towards it and at the same height. One robot of several limbs
-    serves several places at once: its limbs are called like them, the left one serving the first
+    it as its reach asks for, turned towards it and at the same height; raised, if its wheels or
+    feet are lower than its base. One robot of several limbs serves several places at once: its
+    limbs are called like them, the left one serving the first
     unless they are called so already, and its shoulders are above the places. Where its files are
     at hand, all of it but its limbs is behind the task's table, and its hands wait over what they
     share, grippers down (`Placement.qpos`).
@@ -86,7 +88,13 @@ def _moved(placement: Placement, robot: RobotDescriptor, middle: Point) -> Place
         round(m + (at - m) * robot.reach / own.reach, 4) for m, at in zip(middle, flat, strict=True)
     )
     turned = faced(robot, placement.facing)
-    return replace(placement, robot=robot, position=(x, y, z), quaternion=turned)
+    moved = replace(placement, robot=robot, position=(x, y, z), quaternion=turned)
+    if not is_known_arm(robot):
+        from layouts.ready import grounded
+
+        with suppress(AssetError, MissingPackageError):  # else its bodies are not known here
+            return grounded(moved)
+    return moved
 
 
 def _body(robot: RobotDescriptor, layout: Layout, table: Rectangle | None) -> Placement:

@@ -225,8 +225,9 @@ def make(
         num_envs: Number of environments in this process.
         robots: Other robots for some places: a mapping place → robot, or one robot for a task
             with one place; by name, descriptor, the path of a URDF or MJCF to guess it from, or
-            ``MODULE:NAME``. One that lacks its place's keyframe starts from its home's. One robot
-            of several limbs serves all places, and stands as `layouts.at_task` puts it.
+            ``MODULE:NAME``. They stand at the layout's places, or, in a task that fits its robots,
+            where `layouts.at_task` puts them. One that lacks its place's keyframe starts from its
+            home's. One robot of several limbs serves all places, as `layouts.at_task` puts it.
         layout: Another layout with the task's places, in any order; for a task over any number of
             robots, with places of any names. ``bystanders="hold"`` or ``"act"`` lets more robots
             stand there.
@@ -344,13 +345,17 @@ def _replace_robots(
     cls: type[MultiRobotTask], layout: Layout, robots: RobotLike | Mapping[str, RobotLike]
 ) -> Layout:
     if isinstance(robots, Mapping):
+        if cls.robot_counts is None:
+            _refuse_bodies(cls, robots)
+        if cls.fits_robots:
+            return at_task(robots, layout)
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         return Layout({**layout, **changed}, layout.frames)
     if isinstance(robots, (str, PathLike, RobotDescriptor)):
-        if len(layout) == 1:
-            return _replace_robots(cls, layout, {next(iter(layout)): robots})
         if (robot := load_robot(robots)).limbs:
             return at_task(robot, cls if layout == cls.layout else layout)
+        if len(layout) == 1:
+            return _replace_robots(cls, layout, {next(iter(layout)): robot})
     given = [robots] if isinstance(robots, (str, RobotDescriptor)) else robots
     names = [name for name in given if isinstance(name, str)] if isinstance(given, list) else []
     example = dict(zip(layout, names or ["panda"], strict=False))
@@ -358,6 +363,20 @@ def _replace_robots(
         f"robots={shown(robots)} does not say which place each robot takes; the places are"
         f" {list(layout)}, for example robots={example}"
     )
+
+
+def _refuse_bodies(cls: type[MultiRobotTask], robots: Mapping[str, RobotLike]) -> None:
+    """Refuse robots of several limbs in single places.
+
+    Raises:
+        TaskError: If there is one.
+    """
+    for place, robot in ((place, load_robot(robot)) for place, robot in robots.items()):
+        if robot.limbs:
+            raise TaskError(
+                f"{robot.name} has the limbs {', '.join(robot.limbs)}, more than place {place!r}"
+                f" takes; robots={robot.name!r} lets them serve all of {cls.task_id}"
+            )
 
 
 def _stand(placement: Placement, robot: RobotLike) -> Placement:

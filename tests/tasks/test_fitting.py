@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tasks
-from layouts import Layout, face_to_face, side_by_side
+from layouts import Layout, at_task, face_to_face, side_by_side
 from layouts.shared_place import shared_place
 from robots import TaskError
 from tasks.language.fitting import AS_DECLARED, Fit
@@ -45,6 +45,12 @@ def test_small_arms_get_a_small_cube_between_them():
         assert -0.15 * fit.scale <= y - fit.y <= -0.1 * fit.scale
         assert abs(x - fit.x) <= 0.05 * fit.scale
         assert env.state.position("goal_site")[0, 1] > y
+
+
+@pytest.mark.parametrize("robots", [{"left": "so100"}, {"left": "so100", "right": "koch"}])
+def test_other_robots_stand_where_they_reach_as_far(robots):
+    task = tasks.get_task_class(TASK)
+    assert tasks.make(TASK, robots=robots).layout == at_task(robots, task)
 
 
 def test_the_frame_turns_with_the_arms():

@@ -95,6 +95,20 @@ def test_one_robot_of_two_limbs_stands_where_both_reach():
     assert {"left", "right"} <= {name.rpartition(".")[2] for name in layout.arms}
 
 
+@pytest.mark.parametrize(("task", "place"), [(TWO, "left"), ("PickCube-v1", "arm")])
+def test_a_body_takes_all_places_or_none(task, place):
+    words = f"limbs left, right, .* '{place}' takes; robots='baxter' lets them serve all"
+    with pytest.raises(TaskError, match=words):
+        tasks.make(task, robots={place: "baxter"})
+
+
+def test_a_body_stands_at_a_task_of_one_place():
+    (placement,) = make_scenario(
+        tasks.get_task_class("PickCube-v1"), robots="baxter"
+    ).layout.values()
+    assert "arm" in placement.robot.limbs
+
+
 def test_places_that_no_limb_takes_are_refused():
     with pytest.raises(TaskError, match=r"places \['left', 'right'\]; .* \['cell'\]"):
         tasks.make(TWO, layout=Layout({"cell": Placement("panda")}))
