@@ -56,7 +56,7 @@ class Scene:
 
     def scale(self, name: str) -> float:
         """Return how much larger a body is in this episode than it was declared, as a factor."""
-        return next(body.scale for body in self.bodies if body.name == name)
+        return next(body.size for body in self.bodies if body.name == name)
 
     def base(self, robot: str) -> Floats:
         """Return where the base of a robot or a limb stands, (3,)."""

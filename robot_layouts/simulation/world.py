@@ -37,8 +37,9 @@ class WorldBody:
         quaternion: How it is turned there, wxyz.
         anchored: Whether every reset puts it back there.
         marker: Whether it is there for people only: cameras that observe do not see it.
-        scale: Factor by which ``shapes`` are larger than the task declared them; wherever the task
-            puts it, its lowest point is where that of the declared body would be.
+        scale: Factor by which it varies in size; wherever the task puts it, its lowest point is
+            where that of the body without it would be.
+        size: Factor by which ``shapes`` are larger than the task declared them, with ``scale``.
         joints: What moves parts of it; each part is a body of the world, too, ``NAME.JOINT``.
         part_of: The body whose joint moves it; None of those that are no such part.
     """
@@ -51,6 +52,7 @@ class WorldBody:
     anchored: bool = False
     marker: bool = False
     scale: float = field(default=1.0, repr=False)
+    size: float = field(default=1.0, repr=False)
     joints: tuple[Joint, ...] = field(default=(), repr=False)
     part_of: str | None = field(default=None, repr=False)
 
@@ -104,7 +106,8 @@ class World:
         visuals: Whether what pictures need is built, and which meshes.
         bodies: Body by name.
         design: Geometry drawn for the coming episodes, if the task draws any.
-        scales: Factor on the size of bodies, by name; 1 for those that are left out.
+        size: Factor on the size of all bodies that are added.
+        scales: Another one by body; 1 for those that are left out.
         links_pass: Whether links of two robots pass through each other where the robots' files let
             them pass through some of their own, as in ManiSkill; else robots always collide.
         shadows: Whether the first light casts shadows in pictures.
@@ -137,11 +140,17 @@ class World:
         self.visuals: Visuals = visuals
         self.bodies: dict[str, WorldBody] = {}
         self.design: Any = None
+        self.size = 1.0
         self.scales: Mapping[str, float] = {}
         self.links_pass = links_pass
         self.shadows = shadows
         self._number = number
         self._placements = Placements() if placements is None else placements
+
+    @property
+    def whole(self) -> World:
+        """The world itself, of one that is seen in another frame."""
+        return self
 
     def add(
         self,
@@ -178,10 +187,12 @@ class World:
             raise SimulationError(f"this world already has a body called {name!r}")
         self._pose(name, position, quaternion)
         scale = self.scales.get(name, 1.0)
-        if scale != 1.0:
-            shapes = tuple(scaled(shape, scale) for shape in shapes)
-            joints = tuple(joint.scaled(scale) for joint in joints)
-        body = WorldBody(name, shapes, kind, position, quaternion, anchored, marker, scale, joints)
+        if (size := scale * self.size) != 1.0:
+            shapes = tuple(scaled(shape, size) for shape in shapes)
+            joints = tuple(joint.scaled(size) for joint in joints)
+        body = WorldBody(
+            name, shapes, kind, position, quaternion, anchored, marker, scale, size, joints
+        )
         self.bodies[name] = body
         for joint in joints:
             part = WorldBody(part_name(name, joint.name), joint.parts, marker=marker, part_of=name)

@@ -18,6 +18,7 @@ OF_STAGES = 0.6  # of the reward
 class CellTask(MultiRobotTask):
     """A task in stages, on a table under all its arms; a class says no more than what it is about.
 
+    It fits its robots: with others than its own, places and sizes are as much larger or smaller.
     Observed are every TCP, and every declared body with its joints. The dense reward, at most 1, is
     the score of the stage (0.6) and how near the distances of `ways` are to nothing (0.4). What the
     setting ``"varied"`` varies are masses, by a quarter, and the stiffness of drives, by a tenth.
@@ -25,6 +26,7 @@ class CellTask(MultiRobotTask):
 
     physics = PhysicsSettings()
     table = WideTable()
+    fits_robots = True
     stages: ClassVar = {"success": 1.0}
     varied: ClassVar = {
         "mass": {"*": {"uniform": (0.8, 1.25)}},

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from robot_layouts.core.processes.start import preload
 from robot_layouts.simulation import Simulation, State, World
+from robot_layouts.simulation.framed import FramedState, FramedWorld
 from robot_layouts.simulation.maths import Array, Floats, all_finite
 from robot_layouts.simulation.scene.parts import Part
 from robots import SimulationError, TaskError
@@ -42,7 +43,7 @@ from tasks.engine.divergence import (
 )
 from tasks.engine.observation import Observer, read_mode, space_of
 from tasks.engine.pictures import tiled
-from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisions
+from tasks.engine.places import built_layout, fit_of, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario
 from tasks.engine.task import Info, Memory, Task
@@ -135,8 +136,7 @@ class TaskEnv(Remade):
         self.task = task = object.__new__(task_class)
         self.scenario = task.scenario = scenario
         self.layout = task.layout = layout
-        if task_class.fits_robots:
-            vars(task).update(fitted(task_class, layout))
+        task.fit = fit_of(task_class, layout)
         mode = scenario.layout.control_mode(scenario.control_mode)
         self.control_mode = task.control_mode = mode
         self.num_envs = task.num_envs = scenario.num_envs
@@ -473,8 +473,21 @@ class TaskEnv(Remade):
         self._randomizer.describe(world, index)
         self._fill(world)
 
+    def _framed(self, world: World) -> World:
+        """Return a world as the task declares what is in it."""
+        return world if self.task.fit.as_declared else FramedWorld(world, self.task.fit)
+
+    def _declared(self, state: State) -> State:
+        """Return a state as the task declares what is in it."""
+        if self.task.fit.as_declared:
+            return state
+        if (seen := state.memo.get(FramedState)) is None:
+            bodies = self.simulation.worlds[0].bodies
+            seen = state.memo[FramedState] = FramedState(state, self.task.fit, bodies)
+        return seen
+
     def _fill(self, world: World) -> None:
-        expect_nothing(self.task, "build", self.task.build(world))
+        expect_nothing(self.task, "build", self.task.build(self._framed(world)))
         if (varied := self.scenario.randomization) and varied.distractors:
             add_distractors(world, varied.distractors)
 
@@ -493,7 +506,7 @@ class TaskEnv(Remade):
         for i in ids:  # all that is placed here reaches the simulator in one go
             world = self.simulation.worlds[i]
             expect_nothing(task, "reset_robots", task.reset_robots(world, self._rngs[i]))
-            expect_nothing(task, "sample", task.sample(world, self._rngs[i]))
+            expect_nothing(task, "sample", task.sample(self._framed(world), self._rngs[i]))
         if reconfigured:
             self._camera = None
         self._elapsed[ids] = 0
@@ -506,7 +519,7 @@ class TaskEnv(Remade):
         self.simulation.hold(state)
         if self._randomizer is not None:
             self._randomizer.rest(self.simulation, state, ids)
-        task.memory.renew(self._remembered.checked(task.remember(state)), ids)
+        task.memory.renew(self._remembered.checked(task.remember(self._declared(state))), ids)
         expect_nothing(task, "begin_episodes", task.begin_episodes(state, ids))
         info = self._info(state)
         check_info(self.task_class.__name__, info)
@@ -539,7 +552,7 @@ class TaskEnv(Remade):
         return state
 
     def _info(self, state: State) -> Info:
-        judged = self._judged.checked(self.task.evaluate(state))
+        judged = self._judged.checked(self.task.evaluate(self._declared(state)))
         info: Info = {ELAPSED: self._elapsed.copy(), **judged}
         if (modes := self.simulation.modes) is not None:
             info |= {f"{arm}.shortfall": rows.copy() for arm, rows in modes.shortfalls.items()}
@@ -589,9 +602,13 @@ class TaskEnv(Remade):
     def _dense(self, state: State, action: Floats, info: Info) -> Floats:
         if self._rewards.dtype is None:  # the first
             with unchanged(state, f"{self.task_class.__name__}.dense_reward()"):
-                reward = self._rewards.checked(self.task.dense_reward(state, action, info))
+                reward = self._rewards.checked(
+                    self.task.dense_reward(self._declared(state), action, info)
+                )
         else:
-            reward = self._rewards.checked(self.task.dense_reward(state, action, info))
+            reward = self._rewards.checked(
+                self.task.dense_reward(self._declared(state), action, info)
+            )
         if not all_finite(reward):
             refuse_reward(reward, self.task, self._elapsed)
         return reward

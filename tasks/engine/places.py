@@ -6,14 +6,12 @@ import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 from layouts import Layout
 from robots import LayoutError, MissingPackageError, RobotDescriptor, TaskError
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import Task
-from tasks.language.bodies import Body
-from tasks.language.fitting import fit_to
+from tasks.language.fitting import AS_DECLARED, Fit, fit_to
 from tasks.language.needs import ACT, HOLD, Needs
 
 EVERY_PLACE = "*"  # key of a task's needs
@@ -37,23 +35,16 @@ def built_layout(task_class: type[Task], scenario: Scenario) -> Layout:
     return still.in_control_mode(scenario.control_mode)
 
 
-def fitted(task_class: type[Task], layout: Layout) -> dict[str, Any]:
-    """Return what differs in a task that fits other robots than its own, by attribute.
-
-    Its fit, and its bodies with their sizes and places; nothing for its own robots.
+def fit_of(task_class: type[Task], layout: Layout) -> Fit:
+    """Return how a task fits a layout's robots; one that does not is as declared.
 
     Raises:
         TaskError: If no place is in reach of all arms.
     """
+    if not task_class.fits_robots:
+        return AS_DECLARED
     held = max((need.opening or 0.0 for need in task_class.needs.values()), default=0.0)
-    fit = fit_to(layout, task_class.layout, held, task_class.table.outline(layout))
-    if fit.as_declared:
-        return {}
-    bodies = {
-        name: body.fitted(fit) if isinstance(body, Body) else body
-        for name, body in task_class.bodies.items()
-    }
-    return {"fit": fit, "bodies": bodies, **bodies}
+    return fit_to(layout, task_class.layout, held, task_class.table.outline(layout))
 
 
 def check_places(

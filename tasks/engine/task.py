@@ -14,7 +14,7 @@ from robot_layouts.simulation import Camera, PhysicsSettings, Simulation, State,
 from robot_layouts.simulation.maths import Array, Floats, copy
 from robots import UnknownNameError
 from tasks.engine.scenario import Scenario
-from tasks.language.bodies import Declared, Table, WideTable, declared_bodies
+from tasks.language.bodies import Body, Declared, Table, WideTable, declared_bodies
 from tasks.language.fitting import AS_DECLARED, Fit
 from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
@@ -89,7 +89,9 @@ class Task:
         needs: What places need of their robots, by place, ``"*"`` for all others; see
             `tasks.Needs`.
         fits_robots: Whether its places and sizes fit the robots that it is made with; they are
-            declared in numbers for those of ``layout``.
+            declared in numbers for those of ``layout``. `build` and `sample` are then given worlds,
+            and `evaluate`, `dense_reward` and `remember` states, in the frame and the lengths of
+            the declaration; `observe` and all others see the world as it is.
         fit: In methods, how they do: `tasks.Fit`.
         physics: Solver settings; None keeps SAPIEN's own defaults.
         randomization: What varies from episode to episode; None for nothing.
@@ -189,7 +191,7 @@ class Task:
     def build(self, world: World) -> None:
         """Add the task's bodies to a world, in the order declared; the robots stand already."""
         for name, body in self.bodies.items():
-            body.add_to(world, name)
+            body.add_to(world if isinstance(body, Body) else world.whole, name)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Place the task's bodies for a new episode; the robots are placed already."""

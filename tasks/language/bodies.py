@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 from math import cos, isfinite, sin
-from typing import Any, ClassVar, Literal, TypeAlias, TypedDict, TypeVar
+from typing import Any, ClassVar, Literal, TypeAlias, TypedDict
 
 from layouts import Layout
 from objects import ObjectDescriptor, ObjectRegistry
@@ -19,7 +19,6 @@ from objects.shapes import (
     Length,
     Lengths,
     Place,
-    scaled,
 )
 from robot_layouts.core.schema import check_fields
 from robot_layouts.kinematics.quaternions import multiplied
@@ -28,7 +27,6 @@ from robot_layouts.simulation.tabletop import TABLE_OUTLINE
 from robot_layouts.simulation.world import BodyKind
 from robots import TaskError
 from robots.descriptor import IDENTITY, Quaternion
-from tasks.language.fitting import AS_DECLARED, Fit
 from tasks.language.props import (
     FACE_UP,
     GREEN,
@@ -41,7 +39,6 @@ from tasks.language.props import (
 )
 from tasks.language.randomness import EpisodeRandom
 
-_Body = TypeVar("_Body", bound="Body")
 Rectangle = tuple[float, float, float, float]
 Range: TypeAlias = "float | tuple[float, float]"
 """A number, or the smallest and the largest that may be drawn."""
@@ -56,14 +53,12 @@ class Area:
         y: Of its origin (m, world).
         z: Of its origin (m, world); None lays the body on the table.
         yaw: How it is turned about z (rad), or ``"any"`` angle.
-        fit: Where the frame of these numbers lies in the world, and how large it is there.
     """
 
     x: Range = 0.0
     y: Range = 0.0
     z: Range | None = None
     yaw: Range | Literal["any"] = 0.0
-    fit: Fit = field(default=AS_DECLARED, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse what is no range.
@@ -93,11 +88,7 @@ class Area:
             drawn = iter(rng.uniform_between(lows, highs).tolist())
             sides = [next(drawn) if isinstance(side, tuple) else side for side in sides]
         place = [float(side) for side in sides if not isinstance(side, tuple)]
-        turn = self._turn(rng)
-        if self.fit.as_declared:
-            return place, turn
-        x, y, z = self.fit.place((place[0], place[1], place[2]))
-        return [x, y, height if self.z is None else z], self.fit.turned(turn)
+        return place, self._turn(rng)
 
     def _turn(self, rng: EpisodeRandom) -> Quaternion:
         if self.yaw == "any":
@@ -141,9 +132,6 @@ class Body(ABC):
     marker: ClassVar[bool] = False
     """Whether it is there for people only: cameras that observe do not see it."""
 
-    sizes: ClassVar[tuple[str, ...]] = ()
-    """Names of the fields that are lengths, or shapes."""
-
     def __post_init__(self) -> None:
         """Refuse what no body can be.
 
@@ -166,19 +154,6 @@ class Body(ABC):
     def lying(self) -> Quaternion:
         """How it is turned when it lies on the table, wxyz, before any yaw."""
         return IDENTITY
-
-    def fitted(self: _Body, fit: Fit) -> _Body:
-        """Return it as large, and beginning where, a fit says."""
-        changed: dict[str, Any] = {
-            name: _resized(value, fit.scale)
-            for name in self.sizes
-            if (value := getattr(self, name)) is not None
-        }
-        if self.spawn is not None:
-            changed["spawn"] = replace(self.spawn, fit=fit)
-        if self.start is not None:
-            changed["start"] = fit.place(self.start)
-        return replace(self, **changed)
 
     def add_to(self, world: World, name: str) -> None:
         """Build it in a world."""
@@ -226,7 +201,6 @@ class Cuboid(Solid):
 
     half_size: Lengths
     color: Color = RED
-    sizes: ClassVar[tuple[str, ...]] = ("half_size",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -250,7 +224,6 @@ class Cube(Solid):
 
     half_size: Length
     color: Color = RED
-    sizes: ClassVar[tuple[str, ...]] = ("half_size",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -275,7 +248,6 @@ class Ball(Solid):
 
     radius: Length
     color: Color = RED
-    sizes: ClassVar[tuple[str, ...]] = ("radius",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -303,7 +275,6 @@ class Peg(Body):
     half_width: Length
     tail: Color = GREEN
     head: Color = RED
-    sizes: ClassVar[tuple[str, ...]] = ("half_length", "half_width")
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -327,7 +298,6 @@ class Compound(Body):
 
     parts: tuple[Shape, ...]
     rest_height: Coordinate = 0.0
-    sizes: ClassVar[tuple[str, ...]] = ("parts", "rest_height")
 
     def __post_init__(self) -> None:
         """Refuse what no body can be.
@@ -372,7 +342,6 @@ class Object(Body):
     seed: int | None = field(default=None, kw_only=True)
     scale: Factor = field(default=1.0, kw_only=True)
     joints: Mapping[str, Any] = field(default_factory=dict[str, Any], kw_only=True)
-    sizes: ClassVar[tuple[str, ...]] = ("scale",)
 
     def __post_init__(self) -> None:
         """Refuse what no body can be.
@@ -422,7 +391,7 @@ class Object(Body):
         if self.joints:
             lows, highs = zip(*(_bounds(*each) for each in self.joints.items()), strict=True)
             drawn = zip(self.joints, rng.uniform_between(lows, highs).tolist(), strict=True)
-            scale = self.scale * world.body(name).scale
+            scale = self.scale * world.body(name).size
             world.set_joints(name, **{j: self._scaled(j, at, scale) for j, at in drawn})
 
     def _scaled(self, joint: str, position: float, scale: float) -> float:
@@ -454,7 +423,6 @@ class Goal(Body):
     radius: Length
     kind: BodyKind = field(default="kinematic", kw_only=True)
     marker: ClassVar[bool] = True
-    sizes: ClassVar[tuple[str, ...]] = ("radius",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -473,7 +441,6 @@ class Target(Body):
     radius: Length
     kind: BodyKind = field(default="kinematic", kw_only=True)
     start: Place | None = field(default=(0.0, 0.0, 0.0), kw_only=True)
-    sizes: ClassVar[tuple[str, ...]] = ("radius",)
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -538,13 +505,6 @@ class WideTable:
 
 
 Declared: TypeAlias = Body | Table | WideTable
-
-
-def _resized(value: Any, scale: float) -> Any:
-    """Return a length, several, or shapes, larger by a factor."""
-    if isinstance(value, tuple):
-        return tuple(_resized(part, scale) for part in value)
-    return scaled(value, scale) if isinstance(value, Shape) else value * scale
 
 
 def _turned(lying: Quaternion, turn: Quaternion) -> Quaternion:

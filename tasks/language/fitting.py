@@ -7,16 +7,18 @@ lies between them, how it is turned, and by which factor it is larger.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import atan2, cos, pi, sin
+from collections.abc import Sequence
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
 
 from layouts import Layout
 from layouts.frames import Rectangle
 from layouts.placement import Placement
 from layouts.shared_place import shared_place
-from robot_layouts.kinematics.quaternions import multiplied
+from robot_layouts.simulation.framed import AS_DECLARED, Fit
 from robots import DescriptorError, RobotDescriptor, TaskError
-from robots.descriptor import Quaternion, Vector3
 from robots.gripper_motion import gripper_motion
 
 _ROOM = 0.04  # m that a declaration for a Panda needs about its origin, in reach of all arms
@@ -25,55 +27,13 @@ _SPLAYED = 0.28  # rad; between jaws that are turned more a body is held by its 
 _LARGEST, _SMALLEST = 3.0, 0.05
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Where a declaration's frame lies in the world, and how large it is there.
-
-    Attributes:
-        scale: Factor on all lengths.
-        x: Of its origin (m, world).
-        y: Of its origin (m, world).
-        yaw: How it is turned about z (rad).
-    """
-
-    scale: float = 1.0
-    x: float = 0.0
-    y: float = 0.0
-    yaw: float = 0.0
-
-    @property
-    def as_declared(self) -> bool:
-        """Whether it changes nothing."""
-        return self == AS_DECLARED
-
-    def length(self, declared: float) -> float:
-        """Return a declared length as it is here (m)."""
-        return declared if self.as_declared else declared * self.scale
-
-    def place(self, declared: Vector3) -> Vector3:
-        """Return a declared place as it is here (m, world)."""
-        if self.as_declared:
-            return declared
-        x, y, z = (self.scale * along for along in declared)
-        c, s = cos(self.yaw), sin(self.yaw)
-        return (self.x + c * x - s * y, self.y + s * x + c * y, z)
-
-    def turned(self, declared: Quaternion) -> Quaternion:
-        """Return a declared orientation as it is here, wxyz."""
-        if self.as_declared:
-            return declared
-        return multiplied((cos(self.yaw / 2), 0.0, 0.0, sin(self.yaw / 2)), declared)
-
-
-AS_DECLARED = Fit()
-
-
 def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | None = None) -> Fit:
     """Return how a declaration fits other robots, or others' places.
 
-    Its origin lies where all arms reach best, its y axis points from the first arm to the second,
-    and it is as much larger as the arms reach farther, unless that is more than their grippers
-    can hold or than there is room.
+    It is turned as the arms are about their middle, and as much larger as the one that reaches
+    least reaches farther than the task's own, unless that is more than grippers can hold or than
+    there is room. The origin of a declaration for two arms or one lies where they reach best, that
+    of one for more so far from each as it reaches.
 
     Args:
         layout: The robots that are to do the task.
@@ -82,7 +42,7 @@ def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | Non
         table: Outline of the table, x_min, y_min, x_max, y_max (m).
 
     Raises:
-        TaskError: If no place is in reach of all arms.
+        TaskError: If no place is in reach of both arms.
         AssetError: If robot files cannot be found.
     """
     arms = [layout.arm(place) for place in declared.places]
@@ -92,18 +52,42 @@ def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | Non
     scale = min(a.robot.reach for a in arms) / min(a.robot.reach for a in own)
     if held:
         scale = min([scale, *(_holds(arm.robot) / held for arm in arms if _opening(arm.robot))])
-    if (shared := shared_place(layout, tuple(declared.places), table)) is None:
+    turn = _turn(own, arms)
+    if len(arms) > 2:  # that not all need to reach what one does
+        (x, y), room = _middle(own, arms, turn), inf
+    elif (shared := shared_place(layout, tuple(declared.places), table)) is None:
         robots = {place: layout.arm(place).robot.name for place in declared.places}
         names = ", ".join(f"{place!r} ({robot})" for place, robot in robots.items())
         raise TaskError(
             f"no place on the ground is in reach of all of {names}, gripper down; place them nearer"
             " to each other, as layouts.face_to_face(…, spacing='auto') does"
         )
-    (x, y), room = shared
+    else:
+        (x, y), room = shared
     scale = min(scale, room / _ROOM)
-    (x0, y0, _), (x1, y1, _) = (arm.base_position for arm in (arms[0], arms[-1]))
-    yaw = atan2(y1 - y0, x1 - x0) - pi / 2 if len(arms) > 1 else 0.0
-    return Fit(min(max(scale, _SMALLEST), _LARGEST), x, y, yaw)
+    return Fit(min(max(scale, _SMALLEST), _LARGEST), x, y, turn)
+
+
+def _turn(own: Sequence[Placement], arms: Sequence[Placement]) -> float:
+    """Return by how much arms are turned about their middle from where a task's own stand (rad)."""
+    if len(arms) == 1:
+        return 0.0
+    before, after = (_flat(bases) - np.mean(_flat(bases)) for bases in (own, arms))
+    return float(np.angle(np.sum(np.conj(before) * after)))
+
+
+def _middle(
+    own: Sequence[Placement], arms: Sequence[Placement], turn: float
+) -> tuple[float, float]:
+    """Return the place from which arms are as much farther than a task's own as they reach (m)."""
+    reaches = np.array([a.robot.reach / b.robot.reach for a, b in zip(arms, own, strict=True)])
+    x = np.mean(_flat(arms) - reaches * np.exp(1j * turn) * _flat(own))
+    return float(x.real), float(x.imag)
+
+
+def _flat(bases: Sequence[Placement]) -> NDArray[np.complex128]:
+    """Return the bases of arms in the plane, x + iy (m)."""
+    return np.array([complex(*arm.base_position[:2]) for arm in bases])
 
 
 def _alike(arm: Placement, own: Placement) -> bool:

@@ -21,7 +21,7 @@ from tasks import (
 )
 from tasks.maths import Array, Floats, where
 
-# For two Pandas (m); other robots' numbers are as much larger as `fit` says.
+# For two Pandas (m); other robots' are as much larger as `fit` says.
 CUBE_HALF_SIZE = 0.02
 GOAL_RADIUS = 0.025
 HEIGHT = 0.1  # of the cube at least, when the second arm takes it
@@ -59,7 +59,7 @@ class TwoRobotHandOver(MultiRobotTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: placed, and held by the right arm alone, which is static."""
         left, right = state.is_grasping("left", "cube"), state.is_grasping("right", "cube")
-        placed = state.distance("cube", "goal_site") <= self.fit.length(GOAL_RADIUS)
+        placed = state.distance("cube", "goal_site") <= GOAL_RADIUS
         return {
             "is_left_grasping": left,
             "is_right_grasping": right,
@@ -86,7 +86,7 @@ class TwoRobotHandOver(MultiRobotTask):
         height = state.position("cube")[:, 2]
         reach, lift, take, carry, still = closeness(
             state.tcp_distance("left", "cube"),
-            (self.fit.length(HEIGHT) - height).clip(0.0),
+            (HEIGHT - height).clip(0.0),
             state.tcp_distance("right", "cube"),
             state.distance("cube", "goal_site"),
             state.arm_speed("right"),
