@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import re
+import signal
 from collections import defaultdict
 from pathlib import Path
 
@@ -24,6 +25,11 @@ stopped, disks and networks that fail. "One clear error" means a `RobotLayoutsEr
 is wrong; "goes on" means that results are the same as without the fault, or that nothing was lost.
 It also lists each of them, with what happens, in `runs/faults.md`.
 """
+
+
+def pytest_configure() -> None:
+    """Let signals end processes, also where this one was begun with some ignored, as by nohup."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

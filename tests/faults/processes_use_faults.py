@@ -212,6 +212,7 @@ def _seed(env: Any) -> bytes:
 
 
 def _copy_fails() -> None:
+    played = play_own()  # so that this process has seen the robot's files
     with vector(num_workers=2) as env:
         env.reset(seed=4)
         room = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -224,7 +225,7 @@ def _copy_fails() -> None:
             raise AssertionError("nothing failed")
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, room)
-        assert env.step(actions(env))[0].tobytes() == play_own()
+        assert env.step(actions(env))[0].tobytes() == played
 
 
 def _copied_closed() -> None:
