@@ -226,7 +226,7 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
     yield f"Observation, {observation_size(env)} numbers"
     yield observation_table(env.observation_slices, env.observer.senses)
     yield "Cameras, with obs_mode='rgb' or 'rgbd'; with images, only sensed parts are observed"
-    yield camera_table(cameras_of(env.layout, cls.cameras))
+    yield camera_table(cameras_of(env.layout, env.task.cameras))
 
 
 def fit_text(env: TaskEnv) -> str:

@@ -43,7 +43,7 @@ from tasks.engine.divergence import (
 )
 from tasks.engine.observation import Observer, read_mode, space_of
 from tasks.engine.pictures import tiled
-from tasks.engine.places import built_layout, fit_of, is_tested, refuse_collisions
+from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario
 from tasks.engine.task import Info, Memory, Task
@@ -136,7 +136,8 @@ class TaskEnv(Remade):
         self.task = task = object.__new__(task_class)
         self.scenario = task.scenario = scenario
         self.layout = task.layout = layout
-        task.fit = fit_of(task_class, layout)
+        if task_class.fits_robots:
+            vars(task).update(fitted(task_class, layout))
         mode = scenario.layout.control_mode(scenario.control_mode)
         self.control_mode = task.control_mode = mode
         self.num_envs = task.num_envs = scenario.num_envs

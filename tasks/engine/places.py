@@ -6,12 +6,14 @@ import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 from layouts import Layout
+from robot_layouts.simulation import Camera
 from robots import LayoutError, MissingPackageError, RobotDescriptor, TaskError
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import Task
-from tasks.language.fitting import AS_DECLARED, Fit, fit_to
+from tasks.language.fitting import Fit, fit_to
 from tasks.language.needs import ACT, HOLD, Needs
 
 EVERY_PLACE = "*"  # key of a task's needs
@@ -35,16 +37,30 @@ def built_layout(task_class: type[Task], scenario: Scenario) -> Layout:
     return still.in_control_mode(scenario.control_mode)
 
 
-def fit_of(task_class: type[Task], layout: Layout) -> Fit:
-    """Return how a task fits a layout's robots; one that does not is as declared.
+def fitted(task_class: type[Task], layout: Layout) -> dict[str, Any]:
+    """Return what differs in a task that fits other robots than its own, by attribute.
+
+    Its fit, and from where it is seen; nothing for its own robots.
 
     Raises:
-        TaskError: If no place is in reach of all arms.
+        TaskError: If no place is in reach of both arms.
     """
-    if not task_class.fits_robots:
-        return AS_DECLARED
     held = max((need.opening or 0.0 for need in task_class.needs.values()), default=0.0)
-    return fit_to(layout, task_class.layout, held, task_class.table.outline(layout))
+    fit = fit_to(layout, task_class.layout, held, task_class.table.outline(layout))
+    if fit.as_declared:
+        return {}
+    eye, target = map(fit.place, task_class.viewpoint)
+    cameras = tuple(_fitted(camera, fit) for camera in task_class.cameras)
+    return {"fit": fit, "viewpoint": (eye, target), "cameras": cameras}
+
+
+def _fitted(camera: Camera, fit: Fit) -> Camera:
+    """Return a camera that sees the same of what is larger; as it is, if it rides on a link."""
+    if camera.mount is not None:
+        return camera
+    target = None if camera.target is None else fit.place(camera.target)
+    turned = None if camera.quaternion is None else fit.turned(camera.quaternion)
+    return replace(camera, eye=fit.place(camera.eye), target=target, quaternion=turned)
 
 
 def check_places(

@@ -30,6 +30,7 @@ def test_its_own_robots_keep_every_number():
 
 def test_a_robot_that_reaches_and_holds_as_much_changes_nothing():
     assert tasks.make(TASK, robots={"right": "panda_wristcam"}).task.fit is AS_DECLARED
+    assert tasks.make(TASK, robots={}).layout == tasks.get_task_class(TASK).layout
 
 
 def test_small_arms_get_a_small_cube_between_them():
@@ -51,6 +52,14 @@ def test_small_arms_get_a_small_cube_between_them():
 def test_other_robots_stand_where_they_reach_as_far(robots):
     task = tasks.get_task_class(TASK)
     assert tasks.make(TASK, robots=robots).layout == at_task(robots, task)
+
+
+def test_cameras_see_what_is_smaller_from_nearer():
+    env = tasks.make(TASK, robots={"left": "so100"})
+    fit, (own,) = env.task.fit, env.task_class.cameras
+    assert env.task.cameras[0].eye == pytest.approx(fit.place(own.eye))
+    assert env.task.viewpoint[1] == pytest.approx(fit.place(env.task_class.viewpoint[1]))
+    assert env.task_class.cameras == (own,)
 
 
 def test_the_frame_turns_with_the_arms():
