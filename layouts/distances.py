@@ -50,6 +50,16 @@ def apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
     return larger if smaller < UNEQUAL * larger else max(HAND_OVER * (smaller + larger), larger)
 
 
+def farther(robots: Sequence[RobotDescriptor], own: Sequence[RobotDescriptor]) -> list[float]:
+    """Return by which factors robots stand farther from what they do than those they stand in for.
+
+    One that reaches less stands nearer; none stands farther than as all of them reach farther.
+    """
+    reaches = [robot.reach / other.reach for robot, other in zip(robots, own, strict=True)]
+    most = max(1.0, min(reaches))
+    return [min(reach, most) for reach in reaches]
+
+
 def gaps(row: Iterable[RobotDescriptor], more: float = 0.0) -> list[float]:
     """Return the hand-over distances of neighbours in a row, and as much more each (m)."""
     return [apart(*pair) + more for pair in pairwise(row)]

@@ -26,6 +26,7 @@ _SAMPLES = 20_000  # random joint positions per arm
 _LEAST_DOWN = 0.3  # cosine between a gripper's approach and straight down
 _CELL = 0.05  # of the shorter reach: edge of the cells that places are counted in
 HEIGHT = 0.35  # of the shorter reach: how high above the ground places are looked for
+_DEEP = 0.5  # of the depth of the deepest place, that is deep enough
 _OFTEN = 3  # samples in a cell and its neighbours that show it to be well within reach
 
 
@@ -34,8 +35,11 @@ def shared_place(
     places: Sequence[str],
     table: Rectangle | None = None,
     height: float = HEIGHT,
+    near: tuple[float, float] | None = None,
 ) -> tuple[tuple[float, float], float] | None:
     """Return the place on the ground that lies deepest within reach of all arms, and how deep (m).
+
+    Or of the places that lie at least half as deep the one that is nearest to another.
 
     An arm reaches a place if random postures often bring its TCP there, near the ground and with
     the gripper pointing down more than it does aside. Of an arm on a body only postures count in
@@ -46,6 +50,7 @@ def shared_place(
         places: The arms, by their names or places.
         table: Outline of the table that bodies work on, x_min, y_min, x_max, y_max (m).
         height: How near the ground postures count, as a share of the shorter reach.
+        near: That other place, x and y (m, world).
 
     Returns:
         None if no place is in reach of all of them.
@@ -65,11 +70,14 @@ def shared_place(
     if not shared.any():
         return None
     depths = _depths(shared) * cell
-    # Of equally deep places the one in the middle of all.
-    deepest = np.argwhere(depths >= depths.max() - cell / 2)
-    middle = deepest[np.argmin(np.abs(deepest - deepest.mean(axis=0)).sum(axis=1))]
-    x, y = (low + (middle + 0.5) * cell).tolist()
-    return (x, y), float(depths.max())
+    if near is None:  # of equally deep places the one in the middle of all
+        deep = np.argwhere(depths >= depths.max() - cell / 2)
+        found = deep[np.argmin(np.abs(deep - deep.mean(axis=0)).sum(axis=1))]
+    else:
+        deep = np.argwhere(depths >= _DEEP * depths.max())
+        found = deep[np.argmin(np.hypot(*(low + (deep + 0.5) * cell - near).T))]
+    x, y = (low + (found + 0.5) * cell).tolist()
+    return (x, y), float(depths[tuple(found)])
 
 
 def _near_ground(layout: Arrangement, place: str, height: float, table: Rectangle | None) -> Floats:

@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from layouts.distances import SHOULDER, is_known_arm
+from layouts.distances import SHOULDER, farther, is_known_arm
 from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
@@ -33,13 +33,14 @@ NAME = "robot"  # of the place of one robot that serves all roles
 def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> Layout:
     """Return a task's layout with other robots, each where it reaches what the task's own does.
 
-    A robot stands on the line from the task's own to the middle of what is worked on, as far from
-    it as its reach asks for, turned towards it and at the same height; raised, if its wheels or
-    feet are lower than its base. One robot of several limbs serves several places at once: its
-    limbs are called like them, the left one serving the first
-    unless they are called so already, and its shoulders are above the places. Where its files are
-    at hand, all of it but its limbs is behind the task's table, and its hands wait over what they
-    share, grippers down (`Placement.qpos`).
+    A robot stands on the line from the task's own to the middle of what is worked on, turned
+    towards it and at the same height: as much nearer as it reaches less, and farther only as far as
+    all robots reach farther. It is raised, if its wheels or feet are lower than its base.
+
+    One robot of several limbs serves several places at once: its limbs are called like them, the
+    left one serving the first unless they are called so already, and its shoulders are above the
+    places. Where its files are at hand, all of it but its limbs is behind the task's table, and its
+    hands wait over what they share, grippers down (`Placement.qpos`).
 
     Nothing else is checked; `Layout.validate` and `tasks.make` do so.
 
@@ -72,21 +73,24 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
         if place not in layout:
             raise UnknownNameError("place", place, layout)
     middle = _middle(layout)
-    changed = {place: _moved(layout[place], robot, middle) for place, robot in loaded.items()}
+    own = [placement.robot for placement in layout.values()]
+    after = [loaded.get(place, placement.robot) for place, placement in layout.items()]
+    factors = dict(zip(layout, farther(after, own), strict=True))
+    changed = {
+        place: _moved(layout[place], robot, middle, factors[place])
+        for place, robot in loaded.items()
+    }
     return Layout({**layout, **changed}, layout.frames)
 
 
-def _moved(placement: Placement, robot: RobotDescriptor, middle: Point) -> Placement:
-    """Return a placement with another robot, as near to the middle as its reach asks for."""
+def _moved(placement: Placement, robot: RobotDescriptor, middle: Point, factor: float) -> Placement:
+    """Return a placement with another robot, as much farther from the middle as a factor says."""
     if placement.keyframe not in robot.keyframes:
         placement = replace(placement, keyframe=None)
-    own = placement.robot
-    if robot == own or placement.on is not None:
+    if robot == placement.robot or placement.on is not None:
         return placement.with_robot(robot)
     *flat, z = placement.base_position
-    x, y = (
-        round(m + (at - m) * robot.reach / own.reach, 4) for m, at in zip(middle, flat, strict=True)
-    )
+    x, y = (round(m + (at - m) * factor, 4) for m, at in zip(middle, flat, strict=True))
     turned = faced(robot, placement.facing)
     moved = replace(placement, robot=robot, position=(x, y, z), quaternion=turned)
     if not is_known_arm(robot):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
+from layouts.distances import farther
 from layouts.frames import Rectangle
 from layouts.placement import Placement
 from layouts.shared_place import shared_place
@@ -25,6 +26,7 @@ _ROOM = 0.04  # m that a declaration for a Panda needs about its origin, in reac
 _HELD = 0.75  # of a gripper's opening that a body to be held may take
 _SPLAYED = 0.28  # rad; between jaws that are turned more a body is held by its edges, and slips out
 _LARGEST, _SMALLEST = 3.0, 0.05
+_DIGITS = 3  # of places and turns: bases are rounded, too
 
 
 def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | None = None) -> Fit:
@@ -32,8 +34,8 @@ def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | Non
 
     It is turned as the arms are about their middle, and as much larger as the one that reaches
     least reaches farther than the task's own, unless that is more than grippers can hold or than
-    there is room. The origin of a declaration for two arms or one lies where they reach best, that
-    of one for more so far from each as it reaches.
+    there is room. Its origin lies where it does in `layouts.at_task`, or, if it is for two arms or
+    one, where they reach well, as near to that as they do.
 
     Args:
         layout: The robots that are to do the task.
@@ -53,16 +55,15 @@ def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | Non
     if held:
         scale = min([scale, *(_holds(arm.robot) / held for arm in arms if _opening(arm.robot))])
     turn = _turn(own, arms)
-    if len(arms) > 2:  # that not all need to reach what one does
-        (x, y), room = _middle(own, arms, turn), inf
-    elif (shared := shared_place(layout, tuple(declared.places), table)) is None:
-        robots = {place: layout.arm(place).robot.name for place in declared.places}
-        names = ", ".join(f"{place!r} ({robot})" for place, robot in robots.items())
-        raise TaskError(
-            f"no place on the ground is in reach of all of {names}, gripper down; place them nearer"
-            " to each other, as layouts.face_to_face(…, spacing='auto') does"
-        )
-    else:
+    (x, y), room = _middle(own, arms, turn), inf
+    if len(arms) <= 2:  # more of them need not all reach it
+        if (shared := shared_place(layout, tuple(declared.places), table, near=(x, y))) is None:
+            robots = {place: layout.arm(place).robot.name for place in declared.places}
+            names = ", ".join(f"{place!r} ({robot})" for place, robot in robots.items())
+            raise TaskError(
+                f"no place on the ground is in reach of all of {names}, gripper down; place them"
+                " nearer to each other, as layouts.face_to_face(…, spacing='auto') does"
+            )
         (x, y), room = shared
     scale = min(scale, room / _ROOM)
     return Fit(min(max(scale, _SMALLEST), _LARGEST), x, y, turn)
@@ -73,16 +74,16 @@ def _turn(own: Sequence[Placement], arms: Sequence[Placement]) -> float:
     if len(arms) == 1:
         return 0.0
     before, after = (_flat(bases) - np.mean(_flat(bases)) for bases in (own, arms))
-    return float(np.angle(np.sum(np.conj(before) * after)))
+    return round(float(np.angle(np.sum(np.conj(before) * after))), _DIGITS) + 0.0
 
 
 def _middle(
     own: Sequence[Placement], arms: Sequence[Placement], turn: float
 ) -> tuple[float, float]:
-    """Return the place from which arms are as much farther than a task's own as they reach (m)."""
-    reaches = np.array([a.robot.reach / b.robot.reach for a, b in zip(arms, own, strict=True)])
-    x = np.mean(_flat(arms) - reaches * np.exp(1j * turn) * _flat(own))
-    return float(x.real), float(x.imag)
+    """Return the place from which arms are as much farther than a task's own as is usual (m)."""
+    factors = farther([arm.robot for arm in arms], [arm.robot for arm in own])
+    x = np.mean(_flat(arms) - np.array(factors) * np.exp(1j * turn) * _flat(own))
+    return round(float(x.real), _DIGITS) + 0.0, round(float(x.imag), _DIGITS) + 0.0
 
 
 def _flat(bases: Sequence[Placement]) -> NDArray[np.complex128]:

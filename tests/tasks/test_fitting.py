@@ -65,7 +65,7 @@ def test_cameras_see_what_is_smaller_from_nearer():
 def test_the_frame_turns_with_the_arms():
     layout = two("koch").moved((0.0, 0.0, 0.0), yaw=pi / 2)
     straight, turned = (tasks.make(TASK, layout=a).task.fit for a in (two("koch"), layout))
-    assert turned.yaw - straight.yaw == pytest.approx(pi / 2)
+    assert turned.yaw - straight.yaw == pytest.approx(pi / 2, abs=1e-3)
     assert turned.scale == pytest.approx(straight.scale, rel=0.2)
 
 
