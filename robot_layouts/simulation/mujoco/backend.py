@@ -34,6 +34,12 @@ from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, subste
 from robot_layouts.simulation.mujoco.world import MujocoWorld
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
 from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.solvers import (
+    InverseKinematics,
+    PointReach,
+    TreeArm,
+    TreeFollower,
+)
 from robot_layouts.simulation.world import Placements, World, WorldBody
 from robots import SimulationError
 
@@ -55,7 +61,6 @@ class MujocoBackend:
         self.worlds: list[MujocoWorld] = []
         self._robots: RobotModels | None = None
         self._arms: list[ArmWatcher] | None = None
-        self._beside: Any = None
 
     def build(self, worlds: Mapping[int, World]) -> Built:
         """Build worlds; see `Backend`."""
@@ -182,17 +187,18 @@ class MujocoBackend:
 
     def inverse_kinematics(self, robot: str) -> PoseSolver:
         """Return a solver for poses; see `Backend`."""
-        return self._kinematics().inverse_kinematics(robot)
+        return InverseKinematics(self._arm(robot))
 
     def point_reach(self, robot: str) -> PointSolver:
         """Return a solver for points; see `Backend`."""
-        return self._kinematics().point_reach(robot)
+        return PointReach(self._arm(robot))
 
     def pose_follower(
         self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
     ) -> PoseFollower:
         """Return what follows poses of a link; see `Backend`."""
-        return self._kinematics().pose_follower(robot, link, root_link, joints)
+        layout = self.worlds[0].declared.layout
+        return TreeFollower(layout[robot].robot, link, root_link, joints)
 
     def contact_counts(self) -> NDArray[np.int64]:
         """Return how many pairs of bodies touch; see `Backend`."""
@@ -249,11 +255,8 @@ class MujocoBackend:
         moves = self.worlds[0].declared.bodies[name].kind == "dynamic"
         return self._index.body(None, name) if moves else None
 
-    def _kinematics(self) -> Any:
-        """Return SAPIEN's worlds of the same robots, whose kinematics experts plan with."""
-        if self._beside is None:
-            from robot_layouts.simulation.sapien3.backend import SapienBackend
-
-            self._beside = SapienBackend()
-            self._beside.build({0: World(self.worlds[0].declared.layout)})
-        return self._beside
+    def _arm(self, robot: str) -> TreeArm:
+        """Return an arm that stands where it does in the first world."""
+        (first, *_), layout = self.worlds, self.worlds[0].declared.layout
+        owner = layout.owner(robot)
+        return TreeArm(layout, robot, first.base_of(owner))

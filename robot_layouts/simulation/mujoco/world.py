@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from layouts.frames import Pose
 from robot_layouts.kinematics.rotations import rotation_of
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.mujoco.extents import lowest_of
@@ -87,6 +88,13 @@ class MujocoWorld:
                     self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body, row, 0
                 )
         return found
+
+    def base_of(self, robot: str) -> Pose:
+        """Return where the base of a robot stands."""
+        root = self.index.body(robot, self.index.built.robots[robot].root)
+        x, y, z = self.model.body_pos[root].tolist()
+        w, i, j, k = self.model.body_quat[root].tolist()
+        return Pose((x, y, z), (w, i, j, k))
 
     # -- placing -----------------------------------------------------------------------------
 
