@@ -9,11 +9,13 @@ from typing import Annotated, Any
 from layouts import Layout
 from robot_layouts.core.cli import File, Word, by_name
 from robot_layouts.core.commands import notice
+from robot_layouts.simulation.backend import SIMULATORS
 from robots import RobotDescriptor, TaskError
 from robots.named import FORMS, is_path, named_robot
 from tasks.language.needs import ACT, HOLD
 from tasks.randomization.declaration import SETTINGS, Randomization
 
+Simulator = Annotated[str, Word(choices=tuple(SIMULATORS))]
 PlacedRobot = Annotated[str, Word("PLACE=ROBOT", about=FORMS)]
 
 
@@ -54,13 +56,17 @@ class CellOptions(RecordedCell):
     Attributes:
         randomization: What varies from episode to episode: a setting of the task (fixed, spread,
             varied), or a tasks.Randomization in YAML or json.
+        simulator: What computes physics (sapien3).
     """
 
     randomization: File | None = None
+    simulator: Simulator | None = None
 
     def making(self) -> dict[str, Any]:
         """Return the arguments of `tasks.make` that are given; see `RecordedCell.making`."""
         chosen = super().making()
+        if self.simulator is not None:
+            chosen["simulator"] = self.simulator
         if self.randomization is not None:
             setting = str(self.randomization) in SETTINGS
             chosen["randomization"] = (

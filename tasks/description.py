@@ -17,6 +17,7 @@ from rich.table import Table
 
 from layouts import Layout
 from robot_layouts.simulation import Camera
+from robot_layouts.simulation.backend import CLONING
 from robot_layouts.simulation.scene.cameras import AnyCamera, field_of_view, lens_of, ridden
 from robots import TaskError
 from tasks.engine.cameras import cameras_of
@@ -200,6 +201,8 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
     text = read_docstring(cls)
     yield f"{cls.task_id}: {text.summary}\n"
     rows = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    if env.scenario.simulator != CLONING:
+        rows.add_row("simulator", env.scenario.simulator)
     for name, value in (
         ("randomization", text.randomization),
         ("success", text.success),
@@ -208,7 +211,7 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
         ("source", cls.source),
         ("other names", ", ".join([*_full_name(cls), *other_names(cls)])),
         ("from", origin(cls.task_id) or OURS),
-        ("parity", parity_verdicts().get(cls.task_id, "")),
+        ("parity", _parity(env)),
     ):
         rows.add_row(name, value or UNKNOWN)
     phrasings = cls.instruction if isinstance(cls.instruction, tuple) else ()
@@ -227,6 +230,13 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
     yield observation_table(env.observation_slices, env.observer.senses)
     yield "Cameras, with obs_mode='rgb' or 'rgbd'; with images, only sensed parts are observed"
     yield camera_table(cameras_of(env.layout, env.task.cameras))
+
+
+def _parity(env: TaskEnv) -> str:
+    verdict, simulator = parity_verdicts().get(env.task_id, ""), env.scenario.simulator
+    if verdict and simulator != CLONING:
+        return f"none: with simulator {simulator!r} it is the same task with other physics"
+    return verdict
 
 
 def fit_text(env: TaskEnv) -> str:

@@ -11,8 +11,9 @@ from math import atan2, cos, pi, sin
 import numpy as np
 
 import tasks
-from robot_layouts.simulation.sapien3.arms import InverseKinematics
+from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.solvers import InverseKinematics
 from tasks.episode import Episode
 
 OPEN, CLOSED = 1.0, -1.0
@@ -47,7 +48,9 @@ class Puppeteer:
             qpos = self.world.robots[robot].articulation.qpos
             goals[robot] = qpos[: len(placement.robot.arm_joints)]
             if robot in targets:
-                solution = InverseKinematics(self.world, robot).solve(*targets[robot], qpos)
+                solution = InverseKinematics(SapienArm(self.world, robot)).solve(
+                    *targets[robot], qpos
+                )
                 goals[robot] = goals[robot] if solution is None else solution
         self.follow(steps, grip, goals, targets)
 

@@ -50,11 +50,30 @@ def write_mjcf(layout: Arrangement, path: str | os.PathLike[str], *, visuals: bo
     with replaced_folder(folder, _is_own, "save the model under another name") as made:
         note = licence_note(source.robot for source in cell.sources)
         (made / LICENCES).write_text(note, encoding="utf-8")
-        model = _Model(cell, target.stem, folder.name)
-        for source in cell.sources:
-            model.add_meshes(source, made / source.name, visuals=visuals)
-        write_whole(target, model.text())
+        model = mjcf_of(cell, target.stem, made, visuals=visuals)
+        model.add_surroundings()
+        model.add_home()
+        write_whole(target, model.text(folder.name))
     return target
+
+
+def mjcf_of(cell: ExportedCell, name: str, folder: Path, *, visuals: bool) -> MjcfModel:
+    """Return a model of a cell's robots, and save its meshes.
+
+    Args:
+        cell: The robots, with what was read of their files.
+        name: The model's name.
+        folder: Where the meshes go.
+        visuals: Whether it has meshes that are drawn, too.
+
+    Raises:
+        AssetError: If a mesh is missing or cannot be read.
+    """
+    model = MjcfModel(cell, name)
+    for source in cell.sources:
+        model.add_meshes(source, folder / source.name, visuals=visuals)
+    model.add_robots()
+    return model
 
 
 def _is_own(found: Path) -> bool:
@@ -63,19 +82,24 @@ def _is_own(found: Path) -> bool:
     )
 
 
-class _Model:
-    """A model that grows robot by robot."""
+class MjcfModel:
+    """A model that grows robot by robot.
 
-    def __init__(self, cell: ExportedCell, name: str, meshes: str) -> None:
+    Attributes:
+        timestep: At which every drive is stable (s).
+    """
+
+    def __init__(self, cell: ExportedCell, name: str) -> None:
+        """Begin without robots."""
         self._cell, self._shapes = cell, dict[int, Mapping[str, list[dict[str, str]]]]()
         self._root = Element("mujoco", model=name)
-        self._timestep = _timestep(cell.sources)
+        self.timestep = _timestep(cell.sources)
         # MuJoCo's own 20 ms is so soft that what is light and held sinks into fingers.
-        self._stiff = _text([2 * self._timestep, 1.0])
+        self._stiff = _text([2 * self.timestep, 1.0])
         compiler = {"angle": "radian", "autolimits": "true", "balanceinertia": "true"}
-        SubElement(self._root, "compiler", compiler, meshdir=meshes)
+        self._compiler = SubElement(self._root, "compiler", compiler)
         option = SubElement(
-            self._root, "option", timestep=repr(self._timestep), integrator="implicitfast"
+            self._root, "option", timestep=repr(self.timestep), integrator="implicitfast"
         )
         # Which links may touch is said pair by pair, below.
         SubElement(option, "flag", filterparent="disable")
@@ -106,19 +130,25 @@ class _Model:
                 geoms[link].append(_solid(solid, name, source.friction_of(link)))
         self._shapes[id(source)] = geoms
 
-    def text(self) -> str:
-        """Return the model as XML."""
-        self._add_surroundings()
+    def text(self, meshes: str) -> str:
+        """Return the model as XML; ``meshes`` is the folder that has them."""
+        self._compiler.set("meshdir", meshes)
+        indent(self._root)
+        return tostring(self._root, encoding="unicode") + "\n"
+
+    def add_robots(self) -> None:
+        """Add all robots, with their drives."""
         for standing in self._cell.robots.values():
             self._add_robot(standing)
         self._add_pairs()
         self._add_followers()
         self._add_actuators()
+
+    def add_home(self) -> None:
+        """Add the keyframe at which the layout starts the robots."""
         qpos, ctrl = self._qpos, self._ctrl()
         keyframe = SubElement(self._root, "keyframe")
         SubElement(keyframe, "key", name=HOME, qpos=_text(qpos), ctrl=_text(ctrl))
-        indent(self._root)
-        return tostring(self._root, encoding="unicode") + "\n"
 
     def _add_defaults(self) -> None:
         defaults = SubElement(self._root, "default")
@@ -133,7 +163,8 @@ class _Model:
         SubElement(self._assets, "mesh", name=name, file=file, inertia=inertia)
         return name
 
-    def _add_surroundings(self) -> None:
+    def add_surroundings(self) -> None:
+        """Add the layout's tables and frames."""
         for name, (pose, size) in self._cell.tables.items():
             place = {**_pose(pose), "size": _text((size / 2).tolist())}
             SubElement(self._world, "geom", place, name=name, type="box", rgba=_text(GREY))
@@ -164,7 +195,7 @@ class _Model:
         if link in source.inertials:
             SubElement(body, "inertial", _inertial(source.inertials[link]))
         if joint is not None and joint.moves:
-            numbers = _joint(joint, source, self._timestep)
+            numbers = _joint(joint, source, self.timestep)
             SubElement(body, "joint", numbers, name=f"{place}/{joint.name}")
             self._qpos.append(standing.home[joint.name])
         for geom in self._shapes[id(source)][link]:

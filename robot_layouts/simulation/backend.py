@@ -184,8 +184,18 @@ class PointSolver(Protocol):
         ...
 
 
-SIMULATORS = {"sapien3": "robot_layouts.simulation.sapien3.backend:SapienBackend"}
+SIMULATORS = {
+    "sapien3": "robot_layouts.simulation.sapien3.backend:SapienBackend",
+    "mujoco": "robot_layouts.simulation.mujoco.backend:MujocoBackend",
+}
 """Where each simulator's backend is, by the name that ``simulator=`` takes."""
+
+CLONING = "sapien3"
+"""The simulator in which clones of ManiSkill's tasks have its bits; in others their physics is
+another."""
+
+ENGINES = {"sapien3": "sapien", "mujoco": "mujoco"}
+"""The package that computes physics, by simulator."""
 
 
 def open_backend(simulator: str) -> Backend:

@@ -64,7 +64,8 @@ class Scenario:
             own.
         visuals: ``"full"`` draws robots as their files have them, ``"light"`` with meshes of fewer
             triangles that are less than 1 mm from these, which is several times faster.
-        simulator: ``"sapien3"``.
+        simulator: ``"sapien3"``, or ``"mujoco"``, in which a clone of a task of ManiSkill's is the
+            same task with other physics.
         bystanders: What the layout's robots do that have no place in the task: ``"hold"`` still and
             take no action number, or ``"act"``, with action numbers of their own. None refuses
             them.

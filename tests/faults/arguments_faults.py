@@ -23,7 +23,7 @@ WRONG_FIELDS: dict[str, tuple[Any, ...]] = {
     "obs_mode": ("stat", 5, "rgb+", "rgbd+state", None, "rgb\0"),
     "reward_mode": ("stat", "DENSE"),
     "control_mode": ("stat", "pd_joint_delta"),
-    "simulator": ("stat", None, "mujoco"),
+    "simulator": ("stat", None, "mujico"),
     "render_mode": ("stat", "human"),
     "headless": (False, "yes"),
     "check_layout": ("no",),

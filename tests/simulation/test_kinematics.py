@@ -7,8 +7,9 @@ import pytest
 import sapien
 
 from layouts import Layout, Placement
-from robot_layouts.simulation.sapien3.arms import InverseKinematics
+from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.solvers import InverseKinematics
 from robots import RobotRegistry, SimulationError, UnknownNameError
 from tests.catalogue import QUICK
 
@@ -65,7 +66,7 @@ def limits(robot: str, joints: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]
 @pytest.mark.parametrize("robot", [n for n in ROBOTS if n not in ("fetch", "xarm7_ability")])
 @pytest.mark.parametrize("seed", range(3))  # of a hundred, one finds no solution for xarm7
 def test_a_solution_reaches_the_request_within_the_limits(robot, seed):
-    kinematics, start = InverseKinematics(world_of(robot), "arm"), rest(robot)
+    kinematics, start = InverseKinematics(SapienArm(world_of(robot), "arm")), rest(robot)
     low, high = limits(robot, kinematics.joints)
     rng = np.random.default_rng(seed)
     wish = start.copy()
@@ -86,7 +87,7 @@ def test_a_solution_reaches_the_request_within_the_limits(robot, seed):
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_forward_agrees_with_the_physics_engine(robot):
-    kinematics = InverseKinematics(world_of(robot), "arm")
+    kinematics = InverseKinematics(SapienArm(world_of(robot), "arm"))
     arm = arm_of(robot, rest(robot)) + 0.1
     position, quaternion = kinematics.forward(arm)
     expected, turned = reference(robot, with_arm(robot, rest(robot), arm))
@@ -96,13 +97,13 @@ def test_forward_agrees_with_the_physics_engine(robot):
 
 @pytest.mark.parametrize("robot", [n for n in ROBOTS if n not in FREE])
 def test_what_is_out_of_reach_has_no_solution(robot):
-    kinematics = InverseKinematics(world_of(robot), "arm")
+    kinematics = InverseKinematics(SapienArm(world_of(robot), "arm"))
     assert kinematics.solve((1.8, -0.4, 0.2), (0.0, 1.0, 0.0, 0.0), rest(robot)) is None
 
 
 def test_a_solution_never_passes_a_joint_limit():
     """This pose is natural with joint 6 at 4.4 rad, but that joint ends at 3.75."""
-    kinematics, start = InverseKinematics(world_of("panda"), "arm"), rest("panda")
+    kinematics, start = InverseKinematics(SapienArm(world_of("panda"), "arm")), rest("panda")
     arm = np.array([0.0, 1.0, 0.0, -0.6, 0.0, 4.4, 0.0])
     position, quaternion = kinematics.forward(arm)
     solution = kinematics.solve(position, quaternion, start)
@@ -112,7 +113,7 @@ def test_a_solution_never_passes_a_joint_limit():
 
 def test_the_nearest_of_several_solutions_is_taken():
     """Where the robot already is needs no motion, however many other solutions there are."""
-    kinematics, start = InverseKinematics(world_of("panda"), "arm"), rest("panda")
+    kinematics, start = InverseKinematics(SapienArm(world_of("panda"), "arm")), rest("panda")
     position, quaternion = reference("panda", start)
     solution = kinematics.solve(position, quaternion, start)
     np.testing.assert_allclose(solution, start[:7], atol=1e-3)
@@ -120,7 +121,9 @@ def test_the_nearest_of_several_solutions_is_taken():
 
 def test_the_same_request_has_the_same_answer():
     request = (0.4, -0.1, 0.4), (0.0, 1.0, 0.0, 0.0), rest("panda")
-    first, second = (InverseKinematics(world_of("panda"), "arm").solve(*request) for _ in range(2))
+    first, second = (
+        InverseKinematics(SapienArm(world_of("panda"), "arm")).solve(*request) for _ in range(2)
+    )
     np.testing.assert_array_equal(first, second)
 
 
@@ -129,12 +132,12 @@ def test_a_tcp_between_links_is_refused(monkeypatch):
     descriptor = world.layout["arm"].robot
     object.__setattr__(world.layout["arm"], "robot", _between_fingers(descriptor))
     with pytest.raises(SimulationError, match="mean of panda_leftfinger, panda_rightfinger"):
-        InverseKinematics(world, "arm")
+        InverseKinematics(SapienArm(world, "arm"))
 
 
 def test_an_unknown_robot_is_named():
     with pytest.raises(UnknownNameError, match="unknown robot of this layout 'arn'.*'arm'"):
-        InverseKinematics(world_of("panda"), "arn")
+        InverseKinematics(SapienArm(world_of("panda"), "arn"))
 
 
 def _between_fingers(descriptor):

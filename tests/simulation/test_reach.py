@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
-from robot_layouts.simulation.sapien3.arms import PointReach
+from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.solvers import PointReach
 from robots import RobotRegistry, UnknownNameError
 from tests.catalogue import QUICK
 
@@ -33,7 +34,7 @@ def test_forward_agrees_with_the_physics_engine(robot):
     qpos = start_of(robot)
     simulated.reset(qpos)
     pose = simulated.links[simulated.descriptor.tcp_link].entity_pose
-    reach = PointReach(world_of(robot), "arm")
+    reach = PointReach(SapienArm(world_of(robot), "arm"))
     position, quaternion = reach.forward(reach.arm(qpos))
     np.testing.assert_allclose(position, pose.p, atol=1e-5)
     assert abs(np.dot(quaternion, pose.q)) == pytest.approx(1, abs=1e-5)
@@ -45,7 +46,7 @@ def test_forward_agrees_with_the_physics_engine(robot):
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_solution_brings_the_point_there_nearby(robot):
-    reach = PointReach(world_of(robot), "arm")
+    reach = PointReach(SapienArm(world_of(robot), "arm"))
     start = with_room(robot, reach)
     moved = start + 0.1 * np.sin(np.arange(1, len(start) + 1))
     place = reach.place_of(POINT, moved)
@@ -64,7 +65,7 @@ def with_room(robot: str, reach: PointReach) -> np.ndarray:
 
 
 def test_fixed_joints_stay():
-    reach = PointReach(world_of("so100"), "arm")
+    reach = PointReach(SapienArm(world_of("so100"), "arm"))
     start = reach.arm(start_of("so100"))
     place = reach.place_of(POINT, start) + [0.0, 0.0, -0.03]
     solution = reach.solve(POINT, place, start, fixed=("wrist_roll",))
@@ -74,11 +75,11 @@ def test_fixed_joints_stay():
 
 
 def test_a_place_out_of_reach_has_no_solution():
-    reach = PointReach(world_of("so100"), "arm")
+    reach = PointReach(SapienArm(world_of("so100"), "arm"))
     assert reach.solve(POINT, np.array([9.0, 0.0, 0.0]), reach.arm(start_of("so100"))) is None
 
 
 def test_an_unknown_joint_is_refused():
-    reach = PointReach(world_of("so100"), "arm")
+    reach = PointReach(SapienArm(world_of("so100"), "arm"))
     with pytest.raises(UnknownNameError, match="arm joint 'wrist_rol'. Did you mean 'wrist_roll'"):
         reach.solve(POINT, np.zeros(3), reach.arm(start_of("so100")), fixed=("wrist_rol",))

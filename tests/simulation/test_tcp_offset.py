@@ -14,8 +14,9 @@ from robot_layouts.kinematics.rotations import rotate
 from robot_layouts.simulation import Simulation
 from robot_layouts.simulation.checks.overlaps import empty, stand
 from robot_layouts.simulation.checks.trial import tcp_error
-from robot_layouts.simulation.sapien3.arms import InverseKinematics
+from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.world import BuiltWorld
+from robot_layouts.simulation.solvers import InverseKinematics
 from robot_layouts.simulation.state import with_means
 from robots import DescriptorError, RobotRegistry
 from robots.bodies.hulls import load_model
@@ -48,7 +49,7 @@ def test_it_may_lie_beside_the_middle_of_links():
 
 def test_inverse_kinematics_brings_it_where_it_was():
     world = BuiltWorld(Layout({"arm": PLACEMENT}))
-    solver = InverseKinematics(world, "arm")
+    solver = InverseKinematics(SapienArm(world, "arm"))
     start = np.array(PLACEMENT.start_qpos)
     world.robots["arm"].reset(start)
     link = world.robots["arm"].link("panda_hand_tcp").entity_pose
@@ -65,7 +66,7 @@ def test_checks_bring_the_same_place_to_a_target(turned):
     found = Arm(layout, "arm", load_model(BESIDE)).solve([(*target, *turned)])
     best = found.ranked(np.array(PLACEMENT.start_qpos))[0]
     assert found.solved[best]
-    place, _ = InverseKinematics(BuiltWorld(layout), "arm").forward(found.qpos[best, :7])
+    place, _ = InverseKinematics(SapienArm(BuiltWorld(layout), "arm")).forward(found.qpos[best, :7])
     np.testing.assert_allclose(place, target, atol=1.1e-3)
 
 

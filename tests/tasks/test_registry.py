@@ -93,7 +93,10 @@ def test_an_unknown_field_raises():
         ({"obs_mode": "rgbd+state"}, "are joined by '.', and state or state_dict to them"),
         ({"reward_mode": "dens"}, "reward_mode 'dens' is not offered.*'dense'"),
         ({"control_mode": "pd_ee_dance"}, "control_mode 'pd_ee_dance' is not offered"),
-        ({"simulator": "mujoco"}, "simulator 'mujoco' is not offered; choices: 'sapien3'"),
+        (
+            {"simulator": "mujico"},
+            "simulator 'mujico' is not offered; choices: 'sapien3', 'mujoco'",
+        ),
         ({"headless": False}, "headless=False is not offered"),
         ({"cameras": ["base"]}, "cameras has a str; simulation.Camera is needed"),
         ({"physics": 3}, "physics is a int"),

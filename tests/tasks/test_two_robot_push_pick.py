@@ -7,8 +7,9 @@ import tasks
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.geometry import gripper_facing
 from robot_layouts.experts.script import Scene
-from robot_layouts.simulation.sapien3.arms import InverseKinematics
+from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.backend import worlds_below
+from robot_layouts.simulation.solvers import InverseKinematics
 from robots import TaskError
 from tests.tasks.own import look, make, put
 
@@ -23,7 +24,7 @@ def test_the_cube_starts_where_only_the_pusher_reaches_it(seed: int):
     cube, goal = scene.body("cube")[0], scene.body("goal_site")[0]
 
     def reaches(robot: str, place: np.ndarray, forward: float) -> bool:
-        solver = InverseKinematics(world, robot)
+        solver = InverseKinematics(SapienArm(world, robot))
         poses = [(place, gripper_facing(forward, lean)) for lean in np.radians((0, 20, 40))]
         return any(solver.solve(*pose, scene.qpos(robot)) is not None for pose in poses)
 

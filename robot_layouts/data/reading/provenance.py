@@ -12,6 +12,7 @@ import json
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
+from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,6 +33,7 @@ from robot_layouts.core.schema import (
     whole,
 )
 from robot_layouts.data.reading.json_files import FILE_NUMBER, TrajectoryError
+from robot_layouts.simulation.backend import CLONING, ENGINES
 from robots import (
     CONTROL_MODES,
     JointGroup,
@@ -100,6 +102,8 @@ class _Simulation(TypedDict, total=False):
     physics: Object | None
     control_frequency: Finite
     randomization: Object
+    simulator: Name
+    simulator_version: Name
 
 
 class _DrawnWith(CameraData):
@@ -157,14 +161,25 @@ def _describe_group(group: JointGroup) -> dict[str, Any]:
 def describe_simulation(task: TaskEnv) -> dict[str, Any]:
     """Return a task's physics settings (None: SAPIEN's own) and control frequency (Hz).
 
-    And what varies in its worlds, if anything does.
+    And what varies in its worlds, if anything does, and what simulates them, if not SAPIEN.
     """
     physics, randomization = task.scenario.physics, task.scenario.randomization
+    simulator = task.scenario.simulator
     return {
         "physics": None if physics is None else asdict(physics),
         "control_frequency": task.scenario.control_frequency,
         **({"randomization": randomization.to_json()} if randomization else {}),
+        **({} if simulator == CLONING else _describe_engine(simulator)),
     }
+
+
+def _describe_engine(simulator: str) -> dict[str, str]:
+    return {"simulator": simulator, "simulator_version": version(ENGINES[simulator])}
+
+
+def recorded_simulator(simulation: Mapping[str, Any] | None) -> str:
+    """Return what simulated a recording, of what `describe_simulation` wrote."""
+    return (simulation or {}).get("simulator", CLONING)
 
 
 def describe_pictures(scenario: Scenario) -> dict[str, Any]:
@@ -304,6 +319,7 @@ def describe_task(
         AssetError: If robot files cannot be found.
     """
     name, guessed = full_name(task.task_class), describe_guessed(task.scenario.layout)
+    simulator = task.scenario.simulator
     size = task.scenario.camera_size if observed else None
     pictures = describe_pictures(task.scenario) if observed else None
     return {
@@ -314,7 +330,7 @@ def describe_task(
                 "obs_mode": task.obs_mode if observed else "none",
                 "reward_mode": task.reward_mode,
                 "control_mode": plain_mode(task.control_mode),
-                "sim_backend": "physx_cpu",
+                "sim_backend": "physx_cpu" if simulator == CLONING else simulator,
                 **({"sensor_configs": {"width": size[0], "height": size[1]}} if size else {}),
             },
             "max_episode_steps": task.max_episode_steps,

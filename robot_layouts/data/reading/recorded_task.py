@@ -87,6 +87,7 @@ def task_for(
     if "control_frequency" in (file.simulation or {}):
         making["control_frequency"] = file.simulation["control_frequency"]
     making["randomization"] = _varied(file)
+    making["simulator"] = file.simulator
     making |= {"obs_mode": "none", **_drawn_with(file), **observing}
     task = make(
         file.task_id,

@@ -50,6 +50,7 @@ from robot_layouts.data.reading.provenance import (
     listing,
     observed_checksum,
     read_described,
+    recorded_simulator,
 )
 from robots import UnreadableFileError, closest_match
 from tasks import TaskEnv
@@ -267,10 +268,16 @@ class Recording(Sequence[Trajectory]):
                 )
         self._action_dim = action_dim
 
+    @property
+    def simulator(self) -> str:
+        """What simulated its worlds."""
+        return recorded_simulator(self.simulation)
+
     def expect_world(self, task: TaskEnv) -> None:
         """Refuse a task with another layout, robot files or physics than the recording had.
 
-        Native's files do not say what they had; they pass.
+        Native's files do not say what they had; they pass, and so does another simulator, which
+        has to be asked for.
 
         Raises:
             TrajectoryError: If something differs; names every difference, or the first few.
@@ -281,7 +288,7 @@ class Recording(Sequence[Trajectory]):
             difference
             for name, about in recorded.items()
             if about is not None
-            for difference in differences(about, here[name])
+            for difference in differences(_without_engine(about), _without_engine(here[name]))
         ]
         if found:
             raise TrajectoryError(
@@ -471,6 +478,11 @@ class _File:
                 f" damaged ({reason})"
             )
         )
+
+
+def _without_engine(described: Mapping[str, Any]) -> dict[str, Any]:
+    engine = ("simulator", "simulator_version")
+    return {name: about for name, about in described.items() if name not in engine}
 
 
 def first_file(path: str | PathLike[str]) -> Path:

@@ -37,6 +37,7 @@ from robot_layouts.data.recording.episode_files import PartEncoder
 from robot_layouts.data.recording.recorder import Recorder
 from robots import TaskError
 from tasks import TaskEnv
+from tasks.cell_options import Simulator
 from tasks.episode import PlayedEpisode
 
 if TYPE_CHECKING:
@@ -98,6 +99,7 @@ def replay_recording(
     obs_mode: str | None = None,
     folder: Path | None = None,
     file_size: float = FILE_SIZE,
+    simulator: str | None = None,
     on_event: Callable[[ReplaySummary, Event | None], None] = lambda summary, event: None,
     **observing: Any,
 ) -> ReplaySummary:
@@ -115,6 +117,8 @@ def replay_recording(
         obs_mode: What to observe; None: nothing.
         folder: Where ``trajectory.h5`` and ``trajectory.json`` with the observations are written.
         file_size: Size at which a further h5 file is begun (MB); see `Recorder`.
+        simulator: What simulates them, if not what did so when they were recorded: a comparison of
+            both, and no replay.
         on_event: Called once at the start without an event, and after every event.
         observing: With what that is drawn, as arguments of `tasks.make`, where it is otherwise than
             in the recording: ``camera_size``, ``cameras``, ``sensor_configs``, ``visuals``.
@@ -131,7 +135,15 @@ def replay_recording(
         raise TaskError("--obs-mode and --out go together, and not with --from state")
     if observing and folder is None:
         raise TaskError("nothing is drawn without --obs-mode and --out, so cameras do not matter")
+    compares = simulator not in (None, file.simulator)
+    if compares and folder is not None:
+        raise TaskError(
+            f"{file.path} was recorded in {file.simulator!r}; what {simulator!r} makes of it is no"
+            " replay, and is not recorded as one: leave out --out and --obs-mode"
+        )
     places, making = places_by_seed(file, count), dict(cell or {})
+    if compares:
+        making["simulator"] = simulator
     if places is None:
         if folder is not None or not isinstance(executor, InProcessExecutor):
             raise TaskError(
@@ -202,6 +214,7 @@ def replay_command(
     out: Folder | None = None,
     file_size: Annotated[float, Word("MB", megabytes)] = FILE_SIZE,
     workers: WorkerOptions,
+    simulator: Simulator | None = None,
 ) -> int:
     """Play the actions of a recording again, and compare what happens.
 
@@ -209,8 +222,8 @@ def replay_command(
     observed in them; the same command goes on where it was stopped. What is written does not depend
     on who plays.
 
-    Exit code: 0 if every episode ends as recorded, 1 if not, or if a file cannot be played, 130 if
-    interrupted.
+    Exit code: 0 if every episode ends as recorded, or if simulators are compared; 1 if not, or if a
+    file cannot be played; 130 if interrupted.
     Episodes whose reset rebuilt the world must also have the recorded states to the last bit; those
     of reused worlds, and all that begin from a state, need not.
 
@@ -222,6 +235,7 @@ def replay_command(
         out: Folder of the trajectory.h5 and .json that hold what was observed.
         file_size: Begin another file, trajectory_0001.h5 and so on, when one is so large.
         workers: Who plays.
+        simulator: Compare with what happens in another simulator; that is no replay.
 
     Raises:
         RobotLayoutsError: If the recording cannot be played, or the other not be written.
@@ -250,13 +264,18 @@ def replay_command(
                 cell=recording.cell.making(),
                 folder=out,
                 file_size=file_size,
+                simulator=simulator,
                 on_event=show,
                 **observing.observing(),
             )
+        engines = (file.simulator, simulator or file.simulator)
         title = f"{file.path}: {file.task_id}, {file.control_mode}"
     console.print(printable(title), soft_wrap=True)
     found = [episode for _, episode in sorted(summary.found.items())]
     console.print(_table(found))
+    if engines[0] != engines[1]:
+        console.print(_comparison(found, *engines), soft_wrap=True)
+        return 0
     for sentence in _sentences(found, from_):
         console.print(sentence, soft_wrap=True)
     return 0 if summary.agrees else 1
@@ -281,6 +300,14 @@ def _table(found: Sequence[Replayed]) -> Table:
             _states(episode),
         )
     return rows
+
+
+def _comparison(found: Sequence[Replayed], recorded: str, here: str) -> str:
+    same = sum(episode.recorded == episode.success for episode in found)
+    return (
+        f"{same} of {len(found)} episodes, recorded in {recorded}, end alike in {here}. This"
+        " compares two simulators; it is no replay."
+    )
 
 
 def _sentences(found: Sequence[Replayed], start: str) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from robot_layouts.kinematics.chain import motion_terms
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.model.bodies import WORLD, Bodies, RigidBody
 
@@ -51,7 +52,7 @@ class LinkPoses:
         self._slides = np.flatnonzero([tree.slides[i] for tree, i in pick])
         self._terms = np.array(
             [
-                _terms(part.joint, tree.axes[i], slides=bool(tree.slides[i]))
+                motion_terms(part.joint, tree.axes[i], slides=bool(tree.slides[i]))
                 for part, (tree, i) in zip(jointed, pick, strict=True)
             ]
         ).reshape(-1, 3, 16)
@@ -108,14 +109,3 @@ def _depths(parts: tuple[RigidBody, ...], wanted: Iterable[int]) -> dict[int, in
     for part in wanted:
         depth(part)
     return depths
-
-
-def _terms(joint: Floats, axis: Floats, *, slides: bool) -> Floats:
-    """Return the constant of a joint's motion and its factors of sine and cosine, (3, 4, 4)."""
-    x, y, z = axis
-    cross, along, eye = np.zeros((4, 4)), np.zeros((4, 4)), np.eye(4)
-    cross[:3, :3] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
-    along[:3, 3] = axis
-    if slides:
-        return joint @ np.array([eye, along, np.zeros((4, 4))])
-    return joint @ np.array([eye + cross @ cross, cross, -cross @ cross])

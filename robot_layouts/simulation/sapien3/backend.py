@@ -19,7 +19,7 @@ from robot_layouts.simulation.backend import (
     Velocity,
 )
 from robot_layouts.simulation.maths import Flags, Floats
-from robot_layouts.simulation.sapien3.arms import InverseKinematics, PointReach
+from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
 from robot_layouts.simulation.sapien3.bodies import JointedBody
 from robot_layouts.simulation.sapien3.collision import described_shapes
@@ -36,6 +36,7 @@ from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
 from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world, vary
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
 from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.solvers import InverseKinematics, PointReach
 from robot_layouts.simulation.world import Placements, World
 from robots import RobotDescriptor, SimulationError
 
@@ -192,11 +193,11 @@ class SapienBackend:
 
     def inverse_kinematics(self, robot: str) -> InverseKinematics:
         """Return a solver for poses; see `Backend`."""
-        return InverseKinematics(self.worlds[0], robot)
+        return InverseKinematics(SapienArm(self.worlds[0], robot))
 
     def point_reach(self, robot: str) -> PointReach:
         """Return a solver for points; see `Backend`."""
-        return PointReach(self.worlds[0], robot)
+        return PointReach(SapienArm(self.worlds[0], robot))
 
     def pose_follower(
         self, robot: str, link: str, root_link: str | None, joints: Sequence[str]

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import sapien
-from numpy.typing import NDArray
 
 from layouts import Placement
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
+from robot_layouts.simulation.speeds import joint_speeds
 from robots import DescriptorError, JointGroup, RobotDescriptor, UnknownNameError
-from robots.urdf.model import UrdfModel
 
 
 class DrivenLinkage:
@@ -65,11 +64,6 @@ class DrivenLinkage:
 def _ignore(target: float) -> None:
     """Leave a joint's own target aside."""
 
-
-# Per unit of a joint: the least that is taken for its largest speed, what is taken where the URDF
-# has none, and the most (1/s). Wrists of arms turn at 2π rad/s; URDFs also have 0, and 1e6. Fingers
-# that slide at 0.2 m/s are light: a hit that harms nothing makes them ten times as fast.
-SPEEDS = {"rad": (2.0, 2 * np.pi, 100.0), "m": (0.5, 1.0, 10.0)}
 
 _STILL = np.zeros(3, np.float32)
 
@@ -128,7 +122,7 @@ class SimulatedRobot:
         self.loaded_order = [descriptor.joints.index(joint.name) for joint in self.joints]
         self.root: Any = self.articulation.links[0]
         self.driven = [self.joints[i] for i in self.active_index]
-        self.speeds = _speeds(descriptor, blueprint.model)
+        self.speeds = joint_speeds(descriptor, blueprint.model)
         self._set_drives()
         self.linkages: list[DrivenLinkage] = []
         self.setters = list(self._setters())
@@ -204,16 +198,6 @@ class SimulatedRobot:
             else:
                 yield from (joint.set_drive_target for joint in joints)
             first += len(joints)
-
-
-def _speeds(descriptor: RobotDescriptor, model: UrdfModel) -> NDArray[np.float32]:
-    """Return the largest speed of each joint: the URDF's, where it has one that makes sense."""
-    joints = {joint.name: joint for joint in model.moving}
-    speeds: list[float] = []
-    for joint in (joints[name] for name in descriptor.joints):
-        least, usual, most = SPEEDS[joint.unit]
-        speeds.append(min(max(joint.velocity or usual, least), most))
-    return np.array(speeds, np.float32)
 
 
 def _active_index(descriptor: RobotDescriptor, active: list[str]) -> list[int]:

@@ -1,0 +1,262 @@
+"""MuJoCo behind the seam: every verb of `Backend`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_layouts.simulation.backend import (
+    Built,
+    Overlap,
+    Pair,
+    Part,
+    PointSolver,
+    PoseFollower,
+    PoseSolver,
+    Readout,
+    Rows,
+    Velocity,
+)
+from robot_layouts.simulation.maths import Flags, Floats
+from robot_layouts.simulation.mujoco.contacts import (
+    ArmWatcher,
+    ForceReader,
+    overlaps_in,
+    presses_on_object,
+)
+from robot_layouts.simulation.mujoco.drives import JointDrives
+from robot_layouts.simulation.mujoco.extents import extent_of
+from robot_layouts.simulation.mujoco.library import mujoco
+from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, substeps_of
+from robot_layouts.simulation.mujoco.world import MujocoWorld
+from robot_layouts.simulation.scene.cameras import AnyCamera, View
+from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.solvers import (
+    InverseKinematics,
+    PointReach,
+    TreeArm,
+    TreeFollower,
+)
+from robot_layouts.simulation.world import Placements, World, WorldBody
+from robots import SimulationError
+
+# What does not fit is seen in the state, which is no number then; MuJoCo would write a file of it.
+mujoco.set_mju_user_warning(lambda message: None)
+
+
+class MujocoBackend:
+    """N worlds of one layout, each with a state of its own; alike ones share a model.
+
+    A clone of a task of ManiSkill's is the same task here, with other physics.
+
+    Attributes:
+        worlds: The worlds.
+    """
+
+    def __init__(self) -> None:
+        """Begin without worlds."""
+        self.worlds: list[MujocoWorld] = []
+        self._robots: RobotModels | None = None
+        self._arms: list[ArmWatcher] | None = None
+
+    def build(self, worlds: Mapping[int, World]) -> Built:
+        """Build worlds; see `Backend`."""
+        first = next(iter(worlds.values()))
+        if self._robots is None:
+            self._robots = RobotModels(first.layout, visuals=bool(first.visuals))
+        robots = self._robots
+        models: dict[tuple[WorldBody, ...], Any] = {}
+        built: dict[int, MujocoWorld] = {}
+        for number, world in worlds.items():
+            bodies = tuple(world.bodies.values())
+            if bodies not in models:
+                models[bodies] = robots.compile(world)
+                self._index = Inventory(models[bodies], world, robots.cell)
+            inner = substeps_of(world.physics.timestep, robots.timestep)
+            built[number] = MujocoWorld(world, models[bodies], self._index, inner)
+        self.worlds = [
+            built.get(i) or self.worlds[i] for i in range(max(len(self.worlds), len(built)))
+        ]
+        self._drives = JointDrives(self.worlds, first.layout, self._index)
+        self._forces: dict[tuple[Pair, ...], ForceReader] = {}
+        if self._arms is not None:
+            self.watch_arms()
+        return self._index.built
+
+    def clear(self, env_ids: Sequence[int]) -> None:
+        """Begin a reset; see `Backend`."""
+        for i in env_ids:
+            self.worlds[i].clear()
+
+    def vary(self, variations: Mapping[int, Variation]) -> None:
+        """Let worlds differ from what was built; see `Backend`."""
+        for i, variation in variations.items():
+            self.worlds[i].vary(variation)
+
+    def place(self, placements: Placements) -> None:
+        """Stand robots and move bodies; see `Backend`."""
+        for name, rows in placements.robots.items():
+            for i, qpos in rows.items():
+                self.worlds[i].stand(name, qpos)
+        for name, rows in placements.bodies.items():
+            for i, pose in rows.items():
+                self.worlds[i].place(name, pose)
+        for name, rows in placements.joints.items():
+            for i, positions in rows.items():
+                self.worlds[i].set_joints(name, positions)
+
+    def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
+        """Set drive targets; see `Backend`."""
+        self._drives.positions[env_ids] = targets[env_ids]
+
+    def drive_velocities(self, velocities: Floats, env_ids: Sequence[int]) -> None:
+        """Set targets of velocity; see `Backend`."""
+        self._drives.velocities[env_ids] = velocities[env_ids]
+
+    def step(self, env_ids: Sequence[int], substeps: int) -> None:
+        """Advance worlds; see `Backend`."""
+        for i in env_ids:
+            self._drives.pull(i)
+            self.worlds[i].step(substeps)
+
+    def read(self) -> Readout:
+        """Return poses and joints; see `Backend`."""
+        joints, count = self._index.joints, len(self.worlds)
+        poses = np.empty((count, self._index.built.frames, 7), np.float32)
+        qpos, qvel = np.empty((2, count, len(joints.qpos)), np.float32)
+        for i, world in enumerate(self.worlds):
+            world.update()
+            data = world.data
+            poses[i, :, :3], poses[i, :, 3:] = data.xpos[1:], data.xquat[1:]
+            qpos[i], qvel[i] = data.qpos[joints.qpos], data.qvel[joints.qvel]
+        return Readout(poses.swapaxes(0, 1), qpos, qvel)
+
+    def velocities(self, wanted: tuple[Velocity, ...]) -> Floats:
+        """Return velocities of bodies; see `Backend`."""
+        bodies = [self._mover(name) for name, _ in wanted]
+        columns = [slice(3, 6) if kind == "linear" else slice(0, 3) for _, kind in wanted]
+        found = np.empty((len(wanted), len(self.worlds), 3), np.float32)
+        for i, world in enumerate(self.worlds):
+            rows = world.velocities(bodies)
+            for number, column in enumerate(columns):
+                found[number, i] = rows[number, column]
+        return found
+
+    def root_velocities(self) -> Floats:
+        """Return velocities of the robots' roots, which are fixed; see `Backend`."""
+        return np.zeros((len(self._index.robots), len(self.worlds), 6), np.float32)
+
+    def body_joints(self, body: str) -> Floats:
+        """Return joints of a body; see `Backend`."""
+        joints = self._index.jointed[body]
+        rows = [(w.data.qpos[joints.qpos], w.data.qvel[joints.qvel]) for w in self.worlds]
+        return np.array(rows, np.float32).reshape(len(rows), -1)
+
+    def forces(self, pairs: tuple[Pair, ...]) -> Floats | None:
+        """Return contact forces of pairs; see `Backend`."""
+        if pairs not in self._forces:
+            self._forces[pairs] = ForceReader(self.worlds[0], pairs)
+        return self._forces[pairs].read(self.worlds)
+
+    def write(self, env_ids: Sequence[int], bodies: Rows, robots: Rows) -> None:
+        """Put worlds into a state; see `Backend`."""
+        for row, i in enumerate(env_ids):
+            world = self.worlds[i]
+            for name, values in bodies.items():
+                if world.declared.bodies[name].part_of is None:
+                    world.restore_body(name, values[row])
+            for name, values in robots.items():
+                world.restore_robot(name, values[row])
+
+    def look(
+        self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
+    ) -> Callable[[], list[View]]:
+        """Begin to draw what cameras see; see `Backend`."""
+        raise SimulationError("simulator 'mujoco' draws no pictures yet; take 'sapien3'")
+
+    def describe_graphics(self) -> dict[str, str]:
+        """Return on what pictures are drawn; see `Backend`."""
+        return {}
+
+    def segments(self) -> dict[int, Part]:
+        """Return what segmentation's numbers stand for; see `Backend`."""
+        return dict(self._index.parts)
+
+    def inverse_kinematics(self, robot: str) -> PoseSolver:
+        """Return a solver for poses; see `Backend`."""
+        return InverseKinematics(self._arm(robot))
+
+    def point_reach(self, robot: str) -> PointSolver:
+        """Return a solver for points; see `Backend`."""
+        return PointReach(self._arm(robot))
+
+    def pose_follower(
+        self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
+    ) -> PoseFollower:
+        """Return what follows poses of a link; see `Backend`."""
+        layout = self.worlds[0].declared.layout
+        return TreeFollower(layout[robot].robot, link, root_link, joints)
+
+    def contact_counts(self) -> NDArray[np.int64]:
+        """Return how many pairs of bodies touch; see `Backend`."""
+        return np.array([world.data.ncon for world in self.worlds])
+
+    def overlaps(self, env: int) -> list[Overlap]:
+        """Return which parts are inside each other; see `Backend`."""
+        return overlaps_in(self.worlds[env])
+
+    def watch_arms(self) -> None:
+        """Look at which arms touch from now on; see `Backend`."""
+        assert self._robots is not None
+        models = {name: s.source.model for name, s in self._robots.cell.robots.items()}
+        self._arms = [ArmWatcher(world, models) for world in self.worlds]
+        for world, arms in zip(self.worlds, self._arms, strict=True):
+            world.after_each = arms.look
+
+    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
+        """Return which links of different arms touched since it was last asked; see `Backend`."""
+        if self._arms is None:
+            raise SimulationError("contacts between arms are not watched; call watch_arms() first")
+        return self._arms[env].take()
+
+    def touching(self) -> Flags:
+        """Tell where a link pressed on a dynamic body; see `Backend`."""
+        return np.array([presses_on_object(world) for world in self.worlds])
+
+    def extents(self, env: int) -> dict[Part, Floats]:
+        """Return the box around what collides; see `Backend`."""
+        world = self.worlds[env]
+        world.update()
+        boxes = {
+            part: extent_of(world.model, world.data, body)
+            for body, part in self._index.parts.items()
+        }
+        return {part: box for part, box in boxes.items() if box is not None}
+
+    def collision_shapes(self, env: int, body: str) -> list[tuple[Any, ...]]:
+        """Return what a body collides with; see `Backend`."""
+        model, number = self.worlds[env].model, self._index.body(None, body)
+        first = model.body_geomadr[number]
+        return [
+            (
+                mujoco.mjtGeom(model.geom_type[geom]).name,
+                *model.geom_pos[geom].tolist(),
+                *model.geom_quat[geom].tolist(),
+                model.geom_size[geom].tolist(),
+            )
+            for geom in range(first, first + model.body_geomnum[number])
+            if model.geom_contype[geom]
+        ]
+
+    def _mover(self, name: str) -> int | None:
+        moves = self.worlds[0].declared.bodies[name].kind == "dynamic"
+        return self._index.body(None, name) if moves else None
+
+    def _arm(self, robot: str) -> TreeArm:
+        """Return an arm that stands where it does in the first world."""
+        (first, *_), layout = self.worlds, self.worlds[0].declared.layout
+        owner = layout.owner(robot)
+        return TreeArm(layout, robot, first.base_of(owner))

@@ -1,0 +1,92 @@
+"""What drives the joints of robots in MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from layouts import Layout
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.mujoco.model import Inventory
+from robot_layouts.simulation.mujoco.world import MujocoWorld
+from robots import JointGroup
+
+
+class LedGroup:
+    """JointDrives a joint group with leaders; see `robots.JointGroup`.
+
+    Leaders are driven at most their lead ahead of their mean place, which bounds the force, and
+    the others to where the leaders are and as fast, so that jaws which hold something stay
+    parallel.
+    """
+
+    def __init__(self, group: JointGroup, first: int) -> None:
+        """Take a group, and where its first joint stands among all that are driven."""
+        self.places = slice(first, first + len(group.joints))
+        self._lead = group.lead
+        self._multipliers, self._offsets = np.array(group.followers, float).T
+        self._leads = np.array([joint in group.leaders for joint in group.joints])
+
+    def targets(self, wanted: float, qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
+        """Return targets of position and of velocity of the group's joints, each (joints,).
+
+        Args:
+            wanted: Target of position of its first joint, which tells that of all.
+            qpos: Positions of its joints.
+            qvel: Their velocities.
+        """
+        leads = self._leads
+        value = float(((qpos - self._offsets) / self._multipliers)[leads].mean())
+        speed = float((qvel / self._multipliers)[leads].mean())
+        goal = (wanted - self._offsets[0]) / self._multipliers[0]
+        ahead = min(max(goal, value - self._lead), value + self._lead)
+        positions = self._multipliers * np.where(leads, ahead, value) + self._offsets
+        return positions, np.where(leads, 0.0, self._multipliers * speed)
+
+
+class JointDrives:
+    """The targets of all joints, robots in layout order, joints in the descriptors'.
+
+    A drive pulls with stiffness · (target - position) + damping · (target - velocity), as far as
+    its limit lets it; what depends on the targets is its control.
+
+    Attributes:
+        positions: Targets of position, (N, dof) (rad, m).
+        velocities: Targets of velocity, (N, dof) (rad/s, m/s).
+    """
+
+    def __init__(self, worlds: Sequence[MujocoWorld], layout: Layout, index: Inventory) -> None:
+        """Hold all joints where the layout starts them."""
+        start = [qpos for placement in layout.values() for qpos in placement.start_qpos]
+        self.positions = np.tile(np.array(start), (len(worlds), 1))
+        self.velocities = np.zeros_like(self.positions)
+        self._worlds, self._joints = worlds, index.joints
+        self._linkages = list(_linkages(layout))
+        if self._linkages:
+            for i, world in enumerate(worlds):
+                world.before_each = lambda i=i: self.pull(i)
+
+    def pull(self, env: int) -> None:
+        """Set what the drives of a world do in its next step."""
+        model, data = self._worlds[env].model, self._worlds[env].data
+        positions, velocities = self.positions[env], self.velocities[env]
+        if self._linkages:
+            positions, velocities = positions.copy(), velocities.copy()
+        for linkage in self._linkages:
+            at = linkage.places
+            qpos, qvel = data.qpos[self._joints.qpos[at]], data.qvel[self._joints.qvel[at]]
+            positions[at], velocities[at] = linkage.targets(positions[at][0], qpos, qvel)
+        springs, dampers = model.actuator_biasprm[:, 1], model.actuator_biasprm[:, 2]
+        data.ctrl[:] = -springs * positions - dampers * velocities
+
+
+def _linkages(layout: Layout) -> list[LedGroup]:
+    found: list[LedGroup] = []
+    first = 0
+    for placement in layout.values():
+        for group in placement.robot.action_split.groups.values():
+            if group.leaders:
+                found.append(LedGroup(group, first))
+            first += len(group.joints)
+    return found

@@ -1,0 +1,216 @@
+"""One world in MuJoCo: its model, and where everything in it is."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from layouts.frames import Pose
+from robot_layouts.kinematics.rotations import rotation_of
+from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.mujoco.extents import lowest_of
+from robot_layouts.simulation.mujoco.friction import vary_friction
+from robot_layouts.simulation.mujoco.library import mujoco
+from robot_layouts.simulation.mujoco.model import Inventory
+from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.world import World, WorldBody
+from robots import SimulationError
+
+_FREE = 6  # numbers of a velocity; a pose has one more
+
+
+class MujocoWorld:
+    """What stands in a world, and how it moves.
+
+    Attributes:
+        declared: What the task declared.
+        model: MuJoCo's model, which worlds that are alike share until one of them varies.
+        data: MuJoCo's state of it.
+        index: Where everything stands.
+    """
+
+    def __init__(self, declared: World, model: Any, index: Inventory, inner: int) -> None:
+        """Put everything where it was declared.
+
+        Args:
+            declared: What the task declared.
+            model: MuJoCo's model of that.
+            index: Where everything stands.
+            inner: How many steps of MuJoCo's make one of physics.
+        """
+        self.declared, self.index = declared, index
+        self.model = self._as_built = model
+        self.data: Any = mujoco.MjData(model)
+        self._inner, self._current = inner, False
+        self.before_each: Callable[[], None] | None = None
+        self.after_each: Callable[[], None] | None = None
+        for name, body in declared.bodies.items():
+            if body.part_of is None:
+                self._start(name, body)
+        self.update()
+
+    # -- motion ------------------------------------------------------------------------------
+
+    def step(self, substeps: int) -> None:
+        """Advance by steps of physics; what the solver remembers is not carried over."""
+        data, self._current = self.data, False
+        data.qacc_warmstart[:] = 0.0
+        count = substeps * self._inner
+        if self.before_each is None and self.after_each is None:
+            mujoco.mj_step(self.model, data, nstep=count)
+            return
+        for _ in range(count):
+            if self.before_each is not None:
+                self.before_each()
+            mujoco.mj_step(self.model, data)
+            if self.after_each is not None:
+                self.after_each()
+
+    def update(self) -> None:
+        """Compute where all bodies are, unless that is known."""
+        if not self._current:
+            mujoco.mj_kinematics(self.model, self.data)
+            self._current = True
+
+    def velocities(self, bodies: list[int | None]) -> NDArray[np.float64]:
+        """Return angular, then linear velocities of centres of mass in the world, (K, 6)."""
+        self.update()
+        mujoco.mj_comPos(self.model, self.data)
+        mujoco.mj_comVel(self.model, self.data)
+        found = np.zeros((len(bodies), _FREE))
+        for row, body in zip(found, bodies, strict=True):
+            if body is not None:
+                mujoco.mj_objectVelocity(
+                    self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body, row, 0
+                )
+        return found
+
+    def base_of(self, robot: str) -> Pose:
+        """Return where the base of a robot stands."""
+        root = self.index.body(robot, self.index.built.robots[robot].root)
+        x, y, z = self.model.body_pos[root].tolist()
+        w, i, j, k = self.model.body_quat[root].tolist()
+        return Pose((x, y, z), (w, i, j, k))
+
+    # -- placing -----------------------------------------------------------------------------
+
+    def clear(self) -> None:
+        """Begin a reset: everything rests, and anchored bodies are where they were built."""
+        data = self.data
+        data.qvel[:] = data.qfrc_applied[:] = data.qacc[:] = data.qacc_warmstart[:] = 0.0
+        data.xfrc_applied[:] = 0.0
+        for name, body in self.declared.bodies.items():
+            if body.joints:
+                self._set_joints(name, {joint.name: joint.start for joint in body.joints})
+            if body.anchored and body.part_of is None:
+                self._start(name, body)
+        self._current = False
+
+    def place(self, name: str, pose: list[float]) -> None:
+        """Move a body to a position (m) and quaternion (wxyz), (7,); it goes on as fast."""
+        body = self.declared.bodies[name]
+        self._set_pose(name, pose)
+        if body.scale != 1.0:
+            self._raise_scaled(name, body, pose)
+
+    def stand(self, robot: str, qpos: NDArray[np.float64]) -> None:
+        """Stand a robot at joint positions (rad, m), at rest."""
+        joints = self.index.robots[robot]
+        self.data.qpos[joints.qpos], self.data.qvel[joints.qvel] = qpos, 0.0
+        self._current = False
+
+    def set_joints(self, name: str, positions: Mapping[str, float]) -> None:
+        """Move some joints of a body, at rest."""
+        self.data.qvel[self.index.jointed[name].qvel] = 0.0
+        self._set_joints(name, positions)
+
+    def restore_body(self, name: str, row: Floats) -> None:
+        """Take over a state row; see `Backend.write`."""
+        pose, linear, angular = row[:7].tolist(), row[7:10], row[10:13]
+        self._set_pose(name, pose)
+        free = self._free(name)
+        if free is not None:
+            number = self.index.body(None, name)
+            turn = rotation_of(pose[3:])
+            middle = turn @ self.model.body_ipos[number]
+            velocity = self.data.qvel[free : free + _FREE]
+            velocity[:3] = linear - np.cross(angular, middle)
+            velocity[3:] = turn.T @ angular
+        joints = self.index.jointed.get(name)
+        if joints is not None:
+            self.data.qpos[joints.qpos], self.data.qvel[joints.qvel] = np.split(row[13:], 2)
+
+    def restore_robot(self, name: str, row: Floats) -> None:
+        """Take over a state row; its base stands where the layout or a variation says."""
+        joints = self.index.robots[name]
+        self.data.qpos[joints.qpos], self.data.qvel[joints.qvel] = np.split(row[13:], 2)
+        self._current = False
+
+    def _set_pose(self, name: str, pose: list[float]) -> None:
+        number, free = self.index.body(None, name), self._free(name)
+        if free is not None:
+            at = self.model.jnt_qposadr[self.model.body_jntadr[number]]
+            self.data.qpos[at : at + _FREE + 1] = pose
+        else:
+            held = self.model.body_mocapid[number]
+            self.data.mocap_pos[held], self.data.mocap_quat[held] = pose[:3], pose[3:]
+        self._current = False
+
+    def _start(self, name: str, body: WorldBody) -> None:
+        pose = [*body.position, *body.quaternion]
+        self.place(name, pose)
+        if body.joints:
+            self._set_joints(name, {joint.name: joint.start for joint in body.joints})
+
+    def _set_joints(self, name: str, positions: Mapping[str, float]) -> None:
+        joints = self.declared.bodies[name].joints
+        for joint, at in zip(joints, self.index.jointed[name].qpos, strict=True):
+            self.data.qpos[at] = positions.get(joint.name, self.data.qpos[at])
+        self._current = False
+
+    def _free(self, name: str) -> int | None:
+        """Return where a body's own velocity stands, if physics moves it."""
+        number = self.index.body(None, name)
+        held = self.model.body_mocapid[number] >= 0
+        return None if held else int(self.model.body_dofadr[number])
+
+    def _raise_scaled(self, name: str, body: WorldBody, pose: list[float]) -> None:
+        """Put the lowest point of a body where that of the declared one would be."""
+        self.update()
+        lowest = lowest_of(self.model, self.data, self.index.body(None, name))
+        if lowest is not None:
+            x, y, z, *turn = pose
+            raised = z + (z - lowest) * (body.scale - 1) / body.scale
+            self._set_pose(name, [x, y, raised, *turn])
+
+    # -- variation ---------------------------------------------------------------------------
+
+    def vary(self, variation: Variation) -> None:
+        """Let the world differ from what was built, by a model of its own."""
+        if variation.joint_friction:
+            raise SimulationError(
+                "MuJoCo knows no coefficient of friction of joints, which joint_friction varies;"
+                " leave it out of the randomization, or take simulator='sapien3'"
+            )
+        self.model = model = copy.copy(self._as_built)
+        find = self.index.body
+        for part, factor in variation.mass.items():
+            body = find(part.robot, part.name)
+            model.body_mass[body] *= factor
+            model.body_inertia[body] *= factor
+        varied = {find(part.robot, part.name): own for part, own in variation.friction.items()}
+        vary_friction(model, varied, self.declared.physics.friction.static)
+        for part, weightless in variation.weightless.items():
+            model.body_gravcomp[find(part.robot, part.name)] = float(weightless)
+        for factors, column in ((variation.stiffness, 1), (variation.damping, 2)):
+            for part, factor in factors.items():
+                model.actuator(f"{part.robot}/{part.name}").biasprm[column] *= factor
+        for name, (position, quaternion) in variation.bases.items():
+            root = find(name, self.index.built.robots[name].root)
+            model.body_pos[root], model.body_quat[root] = position, quaternion
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        self._current = False

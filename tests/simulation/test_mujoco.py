@@ -1,0 +1,240 @@
+"""MuJoCo behind the seam: it begins as SAPIEN does, and moves things as they are declared."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import tasks
+from layouts import face_to_face, single
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Friction, Plane, Sphere
+from robot_layouts.experts import find_expert
+from robot_layouts.simulation import PhysicsSettings, Simulation
+from robot_layouts.simulation.backend import SIMULATORS
+from robot_layouts.simulation.checks.overlaps import stand
+from robots import CONTROL_MODES, JointGroup, SimulationError
+from tests.quick import quick_cases
+
+pytest.importorskip("mujoco")
+from robot_layouts.simulation.mujoco.drives import LedGroup  # noqa: E402
+
+TASKS = ("PickCube-v1", "TwoRobotPickCube-v1", "PegInsertionSide-v1", "Relay-v1", "PushT-v1")
+CUBE = Box((0.02, 0.02, 0.02))
+WEIGHT = 0.04**3 * 1000 * 9.81  # N
+FLOOR = Plane(quaternion=(0.7071068, 0.0, -0.7071068, 0.0))  # its +x looks up
+ROUNDING = 1e-5  # m, rad
+# m; how far the TCP may be from SAPIEN's on its way, which depends on how often PhysX iterates
+FREE_MOTION = {"pd_joint_pos": 5e-3, "pd_joint_delta_pos": 1e-2}
+
+
+def made(task, **more):
+    return tasks.make(task, simulator="mujoco", **more)
+
+
+def built(*bodies, layout=None, num_envs=1, **more):
+    """Return a simulation of a Panda far from some bodies, each a name, a shape and a position."""
+
+    def build(world, number):
+        world.add("floor", FLOOR, kind="static")
+        for name, shape, position in bodies:
+            world.add(name, shape, position=position)
+
+    layout = layout or single({"arm": "panda"})
+    simulation = Simulation(layout, build, num_envs, simulator="mujoco", **more)
+    stand(simulation)
+    return simulation
+
+
+def wait(simulation, steps=20):
+    for _ in range(steps):
+        simulation.coast(range(simulation.num_envs))
+    return simulation.read()
+
+
+def leaves(thing, name=""):
+    if hasattr(thing, "items"):
+        for key, value in thing.items():
+            yield from leaves(value, f"{name}/{key}")
+    else:
+        yield name, np.asarray(thing, float)
+
+
+@pytest.mark.parametrize("task", quick_cases(TASKS, quick=TASKS[:2]))
+def test_a_reset_is_that_of_sapien_but_for_rounding(task):
+    seen = {}
+    for simulator in SIMULATORS:
+        env = tasks.make(task, num_envs=2, simulator=simulator, obs_mode="state_dict")
+        obs, _ = env.reset(seed=0)
+        seen[simulator] = dict(leaves({"obs": obs, "state": env.get_state_dict()}))
+        env.close()
+    assert seen["sapien3"].keys() == seen["mujoco"].keys()
+    for name, values in seen["sapien3"].items():
+        np.testing.assert_allclose(seen["mujoco"][name], values, atol=ROUNDING, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        CUBE,
+        Sphere(radius=0.02),
+        Cylinder(radius=0.02, half_length=0.05, quaternion=(0.7071068, 0.0, 0.7071068, 0.0)),
+        Capsule(radius=0.02, half_length=0.05),
+        ConvexHull(
+            tuple((x, y, z) for x in (-0.02, 0.02) for y in (-0.02, 0.02) for z in (0, 0.04))
+        ),
+    ],
+    ids=lambda shape: type(shape).__name__,
+)
+def test_every_shape_falls_onto_a_floor_and_its_box_is_around_it(shape):
+    simulation = built(("thing", shape, (1.0, 0.0, 0.2)))
+    boxes = {part.name: box for part, box in simulation.backend.extents(0).items()}
+    assert "floor" not in boxes
+    low, high = boxes["thing"]
+    assert (low < (1.0, 0.0, 0.25)).all()
+    wait(simulation, 10)
+    boxes = {part.name: box for part, box in simulation.backend.extents(0).items()}
+    assert boxes["thing"][0][2] == pytest.approx(0.0, abs=1e-3)
+    assert boxes["thing"][1][2] - boxes["thing"][0][2] == pytest.approx(high[2] - low[2], abs=1e-3)
+
+
+def gripping(simulation, steps=20):
+    """Close the gripper on a cube that is put between its fingers, and return the state."""
+    (world,) = simulation.worlds
+    world.set_pose("cube", simulation.read().tcp_position("arm")[0])
+    action = np.zeros((1, 8), np.float32)
+    action[:, 7] = -1.0
+    for _ in range(steps):
+        simulation.step(action, simulation.read().joint_positions)
+    return simulation.read()
+
+
+def test_a_gripped_cube_hangs_on_both_fingers_by_its_weight():
+    state = gripping(built(("cube", CUBE, (1.0, 0.0, 0.2))))
+    assert state.is_grasping("arm", "cube").tolist() == [True]
+    forces = [
+        state.contact_force("arm", f"panda_{side}finger", "cube")[0] for side in ("left", "right")
+    ]
+    assert forces[0][1] == pytest.approx(-forces[1][1], rel=0.01)
+    assert abs(forces[0][1]) > 10
+    assert sum(forces)[2] == pytest.approx(-WEIGHT, rel=0.05)
+    assert not state.contact_force("arm", "panda_hand", "cube").any()
+
+
+def test_two_surfaces_rub_with_the_mean_of_their_coefficients():
+    slides = {}
+    for static in (0.1, 0.9):  # on a floor of 0.3: in the mean 0.2 and 0.6
+        rough = dataclasses.replace(CUBE, friction=Friction(static, static))
+        simulation = built(("cube", rough, (1.0, 0.0, 0.02)))
+        wait(simulation, 2)
+        row = np.array([[1.0, 0.0, 0.02, 1, 0, 0, 0, 0.5, 0, 0, 0, 0, 0]], np.float32)
+        simulation.write([0], {"cube": row}, {})
+        slides[static] = wait(simulation).position("cube")[0, 0] - 1.0
+    for static, way in slides.items():
+        expected = 0.5**2 / (2 * 9.81 * (static + 0.3) / 2)
+        assert way == pytest.approx(expected, rel=0.1)
+
+
+@pytest.mark.parametrize("mode", quick_cases(CONTROL_MODES, quick=("pd_joint_delta_pos",)))
+def test_a_robot_moves_as_in_sapien(mode):
+    ways = {}
+    for simulator in SIMULATORS:
+        env = tasks.make("PickCube-v1", simulator=simulator, control_mode=mode)
+        env.reset(seed=0)
+        space = env.single_action_space
+        action = (np.maximum(space.low, -1) + np.minimum(space.high, 1)) / 2
+        if "delta" in mode or "vel" in mode:
+            action[:3] = [0.2, -0.2, 0.2]
+        ways[simulator] = []
+        for _ in range(40):
+            env.step(action[None])
+            ways[simulator].append(env.simulation.read().tcp_position("arm")[0])
+        env.close()
+    apart = np.linalg.norm(np.subtract(*ways.values()), axis=1)
+    assert apart.max() < FREE_MOTION.get(mode, 0.05)
+
+
+def test_two_runs_and_any_number_of_worlds_have_the_same_bits():
+    actions = np.random.default_rng(0).uniform(-1, 1, (10, 1, 16)).astype(np.float32)
+    runs = []
+    for count in (1, 1, 3):
+        env = made("TwoRobotPickCube-v1", num_envs=count)
+        env.reset(seed=0)
+        runs.append([env.step(np.tile(action, (count, 1)))[0][0].tolist() for action in actions])
+        env.close()
+    assert runs[0] == runs[1] == runs[2]
+
+
+def test_a_state_that_is_set_goes_on_as_it_did():
+    env = made("PickCube-v1", num_envs=2)
+    env.reset(seed=0)
+    actions = np.random.default_rng(0).uniform(-1, 1, (12, 2, 8)).astype(np.float32)
+    for action in actions[:6]:
+        env.step(action)
+    state = env.get_state_dict()
+    after = [env.step(action)[0] for action in actions[6:]]
+    env.set_state_dict(state)
+    for name, values in leaves(env.get_state_dict()):
+        np.testing.assert_allclose(values, dict(leaves(state))[name], atol=1e-6)
+    again = [env.step(action)[0] for action in actions[6:]]
+    np.testing.assert_allclose(np.array(after), np.array(again), atol=1e-4)
+
+
+def test_a_reset_leaves_other_worlds_alone():
+    env = made("PickCube-v1", num_envs=2)
+    env.reset(seed=0)
+    env.step(np.ones((2, 8), np.float32))
+    before = env.simulation.read()
+    env.reset(seed=5, env_ids=[1])
+    after = env.simulation.read()
+    assert (before.all_poses[:, 0] == after.all_poses[:, 0]).all()
+    assert (before.all_poses[:, 1] != after.all_poses[:, 1]).any()
+
+
+def test_joints_that_carry_fingers_lead_the_others():
+    group = JointGroup(
+        ("one", "other", "tip"), 0.0, 1.0, 10.0, 1.0, 5.0, mimic=True, leaders=("one", "other"),
+        lead=0.1, multipliers=(1.0, -1.0, 0.5), offsets=(0.0, 0.0, 0.2),
+    )  # fmt: skip
+    qpos, qvel = np.array([0.4, -0.2, 0.5]), np.array([0.3, -0.1, 0.0])
+    goals, speeds = LedGroup(group, 0).targets(0.9, qpos, qvel)
+    np.testing.assert_allclose(goals, [0.4, -0.4, 0.5 * 0.3 + 0.2])
+    np.testing.assert_allclose(speeds, [0.0, 0.0, 0.5 * 0.2])
+
+
+def test_arms_that_touch_are_named():
+    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=0.9)
+    simulation = built(layout=layout)
+    with pytest.raises(SimulationError, match="call watch_arms"):
+        simulation.backend.arms_touching(0)
+    simulation.backend.watch_arms()
+    action = np.zeros((1, 16), np.float32)
+    action[:, [1, 9]] = 1.0
+    for _ in range(40):
+        simulation.step(action, simulation.read().joint_positions)
+    (one, other), *_ = simulation.backend.arms_touching(0)
+    assert {one.robot, other.robot} == {"left", "right"}
+    assert simulation.backend.arms_touching(0) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"continuous_collision": True}, "make the timestep shorter"),
+        ({"rest_offset": 0.001}, "at 0"),
+    ],
+)
+def test_what_mujoco_cannot_do_is_refused(settings, sentence):
+    with pytest.raises(SimulationError, match=sentence):
+        built(physics=PhysicsSettings(**settings))
+
+
+EXPERTS = ("TwoRobotPickCube-v1", "StackCube-v1", "TwoRobotLiftBar-v1", "CellPutAway-v1")
+
+
+@pytest.mark.parametrize("task", quick_cases(EXPERTS, quick=()))
+def test_experts_that_know_no_engine_solve_tasks(task):
+    env = made(task)
+    plan = find_expert(task)(env, 0)
+    env.reset(seed=0)
+    successes = [bool(env.step(action[None])[4]["success"][0]) for action in plan]
+    assert any(successes)
