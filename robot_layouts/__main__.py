@@ -24,6 +24,7 @@ _FOR_USERS = {
     "report": "robot_layouts.data.dataset.report:report",
     "view": "robot_layouts.data.commands:view",
     "evaluate": "robot_layouts.data.playing_commands:evaluate",
+    "serve": "robot_layouts.data.serving.server:serve_command",
     "verify": "robot_layouts.data.playing_commands:verify",
     "suite show": "robot_layouts.data.suite.command:show",
     "suite run": "robot_layouts.data.suite.command:run",
