@@ -20,6 +20,8 @@ _FOR_USERS = {
     "convert": "robot_layouts.data.recording.convert:convert_command",
     "merge": "robot_layouts.data.recording.merge:merge_command",
     "export": "robot_layouts.data.export.dataset:export_command",
+    "data build": "robot_layouts.data.recipes.build:build_command",
+    "data recipe": "robot_layouts.data.recipes.build:recipe_command",
     "data push": "robot_layouts.data.publishing.push:push_command",
     "report": "robot_layouts.data.dataset.report:report",
     "view": "robot_layouts.data.commands:view",
