@@ -497,7 +497,7 @@ def main(
         value = getattr(usual, field)
         add(f"--{field}", type=type(value), default=value, help="of pictures (%(default)s)")
     add("--workers", type=int, help="processes that record (default: one per core)")
-    add("--recording", type=Path, help="folder of a recording that is there already")
+    add("--recording", type=Path, help="a recording that is there: folder, or hub:OWNER/NAME")
     add("--out", type=Path, help=f"folder (default: runs/{name}/TASK)")
     options = parser.parse_args(arguments)
     sys.path.append(os.getcwd())  # for MODULE:ID of the present folder

@@ -93,7 +93,7 @@ def licence_note(robots: Iterable[RobotDescriptor]) -> str:
         robots: The robots, of which each is listed once.
     """
     lines = dict.fromkeys(
-        f"- {robot.name}: {words}" for robot in robots for _, words in _licences(robot.urdf)
+        f"- {robot.name}: {words}" for robot in robots for _, words in licences_of(robot)
     )
     head = (
         "# Robot files\n\nThe meshes and numbers of robots are made of files that others wrote."
@@ -104,11 +104,15 @@ def licence_note(robots: Iterable[RobotDescriptor]) -> str:
 
 def short_licences(robots: Iterable[RobotDescriptor]) -> tuple[str, ...]:
     """Return the short names of the licences of some robots' files, each once."""
-    return tuple(dict.fromkeys(name for robot in robots for name, _ in _licences(robot.urdf)))
+    return tuple(dict.fromkeys(name for robot in robots for name, _ in licences_of(robot)))
+
+
+def licences_of(robot: RobotDescriptor) -> Iterator[tuple[str, str]]:
+    """Yield the licence of each part of a robot: its short name, and what to know about it."""
+    return _licences(robot.urdf)
 
 
 def _licences(source: UrdfSource) -> Iterator[tuple[str, str]]:
-    """Yield the licence of each part of a robot: its short name, and what to know about it."""
     if isinstance(source, AssembledUrdf):
         for part in (source.body, *(part.urdf for part in source.parts)):
             yield from _licences(part)

@@ -14,20 +14,19 @@ import zlib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from importlib.util import find_spec
-from json import JSONDecodeError
 from lzma import LZMAError
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import open_regular
 from robot_layouts.core.progress import Progress
+from robots.assets.hub_client import ENDPOINT_VARIABLE, silent_bar, why
 from robots.assets.manifest import AssetFile, load_manifest
 from robots.assets.packages import IndexPackage, SourceError, find_package
 from robots.assets.progress import listing, say
 from robots.assets.store import AssetStore, FileState
 
-ENDPOINT_VARIABLE = "HF_ENDPOINT"
 REVISION_VARIABLE = "ROBOT_LAYOUTS_HF_REVISION"
 
 _DEFAULT_REVISION = "main"
@@ -198,7 +197,7 @@ class HubSource:
                 timeout=constants.HF_HUB_ETAG_TIMEOUT,
             )
         except Exception as error:  # the client lets its HTTP library's errors through
-            raise SourceError(f"{self._at(dataset)}: {_reason(error)}") from error
+            raise SourceError(f"{self._at(dataset)}: {why(error, _STATUSES)}") from error
         return about.sha or self.revision
 
     def _download(self, file: AssetFile, commit: str, again: bool) -> Path | None:
@@ -216,13 +215,13 @@ class HubSource:
                 endpoint=self.endpoint,
                 token=False,
                 force_download=again,
-                tqdm_class=_silent_bar(),
+                tqdm_class=silent_bar(),
             )
             return Path(cached)
         except RemoteEntryNotFoundError:
             return None
         except Exception as error:  # as above
-            reason = f"{_hub_path(file)}: {_reason(error)}"
+            reason = f"{_hub_path(file)}: {why(error, _STATUSES)}"
             raise SourceError(f"{self._at(dataset)}: {reason}") from error
 
     def _at(self, dataset: str) -> str:
@@ -282,34 +281,6 @@ def _read_cached(file: AssetFile, path: Path) -> bytes:
 
 def _hub_path(file: AssetFile) -> str:
     return f"{file.origin.hub_folder}/{file.path}"
-
-
-def _silent_bar() -> type[Any]:
-    """Return a progress bar for the Hub's client that shows nothing."""
-    from tqdm import tqdm
-
-    class SilentBar(tqdm):  # pyright: ignore[reportMissingTypeArgument]
-        def __init__(self, *args: Any, **settings: Any) -> None:
-            super().__init__(*args, **{**settings, "disable": True})
-
-    return SilentBar
-
-
-def _reason(error: BaseException) -> str:
-    """Return in one line why the Hub's client failed."""
-    from huggingface_hub.errors import LocalEntryNotFoundError
-
-    if isinstance(error, LocalEntryNotFoundError) and error.__cause__ is not None:
-        return _reason(error.__cause__)
-    status = getattr(getattr(error, "response", None), "status_code", None)
-    if status is not None:
-        return _STATUSES.get(status, f"HTTP error {status}")
-    if isinstance(error, OSError) and error.errno:
-        return f"the Hub's cache cannot be written: {error.strerror}: {error.filename}"
-    if isinstance(error, JSONDecodeError):
-        return "the server answers with something that is not JSON, such as a login page"
-    first_line = str(error).strip().partition("\n")[0]
-    return f"{type(error).__name__}: {first_line}"
 
 
 def _unpack(wheel: Path, wanted: Sequence[AssetFile], beside: Sequence[AssetFile]) -> Contents:

@@ -187,15 +187,25 @@ def load_cameras(path: str | PathLike[str]) -> dict[str, Any]:
     Raises:
         TaskError: If the file cannot be read, or a camera is invalid; the message names the file.
     """
-    data = _with_whole_sizes(read_data(path, "cameras"))
     try:
-        check(data, CameraData, "")
-        for name in data:
-            if name not in CameraData.__annotations__:
-                raise UnknownNameError("entry", name, CameraData.__annotations__)
-        return cameras_again(data)
+        return read_cameras(read_data(path, "cameras"))
     except (FieldError, RobotLayoutsError) as error:
         raise TaskError(f"{path}: {error}") from error
+
+
+def read_cameras(data: Any) -> dict[str, Any]:
+    """Return what the data of a YAML file declares, as arguments of `tasks.make`; see above.
+
+    Raises:
+        RobotLayoutsError: If a camera is invalid.
+        FieldError: If something is of another kind.
+    """
+    data = _with_whole_sizes(data)
+    check(data, CameraData, "")
+    for name in data:
+        if name not in CameraData.__annotations__:
+            raise UnknownNameError("entry", name, CameraData.__annotations__)
+    return cameras_again(data)
 
 
 def cameras_again(data: Mapping[str, Any]) -> dict[str, Any]:

@@ -116,7 +116,7 @@ def test_nothing_is_read_outside_of_a_suites_folder(folder, what, path):
     text = f"name: x\nseeds: 1\ntasks: [{{task: PickCube-v1, {what}: {path}}}]"
     with pytest.raises(TaskError) as caught:
         load_suite(written(own, text))
-    assert f"'{path}' is no file below the suite's folder" in str(caught.value)
+    assert f"'{path}' is no file below the folder of what names it" in str(caught.value)
 
 
 def test_what_lies_below_a_suites_folder_is_read(folder):

@@ -12,14 +12,14 @@ import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any
+from typing import Any, ClassVar
 from urllib.parse import unquote, urlsplit
 
 DATASET = "RoboVerseOrg/roboverse_data"
 COMMIT = hashlib.sha1(b"the only commit").hexdigest()
 
 # What a rule does to a request instead of answering it properly.
-Fault = Callable[["_Handler", bytes], None]
+Fault = Callable[["Handler", bytes], None]
 
 
 @dataclass
@@ -36,6 +36,8 @@ class Rule:
 class HubServer:
     """One dataset with one commit; use it as a context manager."""
 
+    handler: ClassVar[type[BaseHTTPRequestHandler]]
+
     files: dict[str, bytes]
     requests: list[tuple[str, str]] = field(default_factory=list)
     authorizations: list[str] = field(default_factory=list)
@@ -44,7 +46,7 @@ class HubServer:
         self.dead = False
         self._rules: list[Rule] = []
         self._lock = threading.Lock()
-        self._server = _Server(("127.0.0.1", 0), _Handler)
+        self._server = _Server(("127.0.0.1", 0), self.handler)
         self._server.hub = self
 
     def __enter__(self) -> HubServer:
@@ -86,7 +88,7 @@ class _Server(ThreadingHTTPServer):
         """Say nothing: clients are killed and connections reset on purpose here."""
 
 
-class _Handler(BaseHTTPRequestHandler):
+class Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
     server: Any
 
@@ -181,22 +183,25 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
 
+HubServer.handler = Handler
+
+
 def status(code: int, error_code: str | None = None) -> Fault:
     """Answer with an HTTP error."""
     return lambda handler, body: handler.send_error_code(code, error_code)
 
 
-def corrupt(handler: _Handler, body: bytes) -> None:
+def corrupt(handler: Handler, body: bytes) -> None:
     """Send bytes of the right size, some of them wrong."""
     handler.send_file(bytes(byte ^ 1 for byte in body), etag_of=body)
 
 
-def truncate(handler: _Handler, body: bytes) -> None:
+def truncate(handler: Handler, body: bytes) -> None:
     """Send half of the file and close the connection."""
     handler.send_half(body)
 
 
-def die(handler: _Handler, body: bytes) -> None:
+def die(handler: Handler, body: bytes) -> None:
     """Send half of the file, reset the connection, and never answer anyone again."""
     handler.server.hub.dead = True
     handler.send_half(body)
@@ -206,7 +211,7 @@ def die(handler: _Handler, body: bytes) -> None:
 def stall(reached: threading.Event) -> Fault:
     """Send half of the file, tell that this happened, and then nothing more."""
 
-    def fault(handler: _Handler, body: bytes) -> None:
+    def fault(handler: Handler, body: bytes) -> None:
         handler.send_half(body)
         reached.set()
         handler.rfile.read(1)  # returns when the client goes away
@@ -214,13 +219,13 @@ def stall(reached: threading.Event) -> Fault:
     return fault
 
 
-def compressed(handler: _Handler, body: bytes) -> None:
+def compressed(handler: Handler, body: bytes) -> None:
     """Send the file compressed, as proxies do."""
     headers = {**_file_headers(body), "Content-Encoding": "gzip"}
     handler.send_without_length([gzip.compress(body)], headers)
 
 
-def login_page(handler: _Handler, body: bytes) -> None:
+def login_page(handler: Handler, body: bytes) -> None:
     """Answer as a hotel's network does before one has paid."""
     handler.send_page(200, "<html><form>Welcome! Your room number?</form></html>", {})
 

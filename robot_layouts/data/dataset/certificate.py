@@ -27,6 +27,7 @@ from robot_layouts.data.playing.replay import (
     replay,
 )
 from robot_layouts.data.playing.scheduler import Event
+from robot_layouts.data.reading.hub import on_hub
 from robot_layouts.data.reading.json_files import (
     MAX_JSON,
     MAX_SEED,
@@ -309,7 +310,8 @@ def certify(
     Args:
         path: The recording: an h5 file, a folder or a manifest.
         executor: Who plays.
-        out: The certificate; by default ``certificate.json`` beside the recording.
+        out: The certificate; by default ``certificate.json`` beside the recording, if that is on
+            this machine.
         task_id: The recording's task; ``module:Id`` for one of a module that no package lists.
         cell: Where robots stood and which, where the file cannot say it; see `task_for`.
         on_event: Called once at the start without an event, and after every event.
@@ -321,6 +323,8 @@ def certify(
         WorkerError: If workers cannot be started, or die again and again.
         KeyboardInterrupt: If interrupted.
     """
+    if out is None and on_hub(path):
+        raise RecordingError(f"{path} has no room for its certificate; say where (--out)")
     out = out or certificate_path(path)
     with open_recording(path, task_id) as file:
         seeds = _seeds_of(file)

@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 
 from layouts import Layout, Placement
 from robot_layouts.data.export.columns import ColumnReader
-from robot_layouts.data.reading.json_files import EpisodeEntry, RecordingSummary, read_summary
+from robot_layouts.data.reading.json_files import EpisodeEntry, describe_source, read_summary
 from robot_layouts.data.reading.recording import Recording, Trajectory, all_files
 from robot_layouts.data.video import Picture, open_video, play_pictured
 from tasks import TaskEnv
 from tasks.episode import Episode
 from tasks.native.format import articulation_keys
 
-_UNKNOWN = "unknown"
 _Columns = tuple[NDArray[np.int64], NDArray[np.bool_], dict[str, NDArray[np.float64]]]
 STRIDE = 2  # control steps from one picture to the next
 
@@ -124,18 +123,6 @@ def read_contents(
         for name in dict.fromkeys(name for _, _, drawn in parts for name in drawn)
     }
     return found
-
-
-def describe_source(entry: EpisodeEntry, summary: RecordingSummary) -> str:
-    """Return the name of an episode's source: who acted, and who corrected."""
-    source = entry.source
-    if source is None:
-        named = (summary.source_type, summary.source_desc)
-        return " ".join(filter(None, named)) or _UNKNOWN
-    actors: list[Mapping[str, Any]] = source.get("actors") or [source]
-    words = " and ".join(f"{a.get('kind', '')} {a.get('name', '')}".strip() for a in actors)
-    corrected: Mapping[str, Any] | None = source.get("corrects")
-    return words + (f", correcting {corrected.get('name', '')}" if corrected else "")
 
 
 def numbers_of(drawn: Any, name: str = "") -> Iterator[tuple[str, float]]:

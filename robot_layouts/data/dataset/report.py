@@ -32,6 +32,7 @@ from robot_layouts.data.dataset.contents import (
 )
 from robot_layouts.data.playing.command_options import RecordingPath
 from robot_layouts.data.playing.replay import open_recording
+from robot_layouts.data.reading.hub import on_hub
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import all_files, first_file
@@ -321,7 +322,7 @@ def make_report(
                 films = film(file, task, chosen, lambda: progress(next(done), total, "filming"))
         described = file.layout or {}
     return DatasetReport(
-        title=first_file(path).absolute().parent.name if first_file(path) != path else path.name,
+        title=_title(path),
         contents=contents,
         layout={name: (about["robot"], about["position"]) for name, about in described.items()},
         certificate=_certificate(path, remarks),
@@ -329,6 +330,12 @@ def make_report(
         clips=films,
         remarks=remarks,
     )
+
+
+def _title(path: Path) -> str:
+    if on_hub(path):
+        return str(path)
+    return first_file(path).absolute().parent.name if first_file(path) != path else path.name
 
 
 def _certificate(path: Path, remarks: list[str]) -> RecordingCertificate | None:

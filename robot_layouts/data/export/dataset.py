@@ -30,6 +30,13 @@ from robot_layouts.data.playing.command_options import (
 )
 from robot_layouts.data.playing.executor import ProcessExecutor
 from robot_layouts.data.point_clouds import Box, point_cloud
+from robot_layouts.data.publishing.push import (
+    DatasetPush,
+    Repository,
+    Sharing,
+    checked_name,
+    report_push,
+)
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory
@@ -482,6 +489,8 @@ def export_command(
     points_box: BoxCorners | None = None,
     only_successes: bool = False,
     options: ExportOptions,
+    push_to_hub: Repository | None = None,
+    sharing: Sharing,
     players: Players,
 ) -> None:
     """Write a recording as a dataset for LeRobot or robomimic.
@@ -490,7 +499,7 @@ def export_command(
     usage.
 
     Args:
-        recording: An h5 file, or a recording's folder.
+        recording: An h5 file, a recording's folder, or one on the Hub.
         format: Format of the dataset: lerobot or robomimic.
         out: New folder for the dataset.
         cameras: Draw what these cameras see, as videos (lerobot) or arrays (robomimic): all,
@@ -499,6 +508,8 @@ def export_command(
         points_box: Only points in a box: its lowest and its highest corner (m).
         only_successes: What happens anyway.
         options: What the dataset holds.
+        push_to_hub: Push it to the Hugging Face Hub, with a card; see `data push`.
+        sharing: How it is shared there.
         players: Who plays.
 
     Raises:
@@ -515,6 +526,10 @@ def export_command(
         points_box=None if points_box is None else (points_box[:3], points_box[3:]),
         **vars(options),
     )
+    if push_to_hub is not None:
+        checked_name(push_to_hub, sharing)
+    elif sharing != Sharing():
+        raise UsageError("--licence and --private are of no use without --push-to-hub")
     in_process = players.workers == 0 and players.ray is None
     executor = None if in_process else players.executor()
     with ProgressLine(unit="episodes") as line, stop_signals():
@@ -529,3 +544,5 @@ def export_command(
         failures = plural(done.left_out, "episode")
         left_out = f"; left out: {failures} without success (--include-failures exports them)"
     print(f"{done.folder}: {plural(done.episodes, 'episode')}, {done.steps} steps{left_out}")
+    if push_to_hub is not None:
+        report_push(DatasetPush.of(out, push_to_hub, sharing))

@@ -59,7 +59,7 @@ def _picture_size(text: str) -> tuple[int, int]:
 
 PictureSize = Annotated[tuple[int, int], Word("WxH", _picture_size)]
 Policy = Annotated[str, Word("MODULE:NAME|ws://HOST:PORT")]
-RecordingPath = Annotated[Path, Word("FILE")]
+RecordingPath = Annotated[Path, Word("FILE|hub:OWNER/NAME")]
 ControlMode = Annotated[
     str | dict[str, str],
     Word(
@@ -177,7 +177,7 @@ class RecordingOption:
     """Which recording a command is about.
 
     Attributes:
-        file: An h5 file, or the folder of a recording, with all its files.
+        file: An h5 file, the folder of a recording, with all its files, or hub:OWNER/NAME@REVISION.
         task: Its task, MODULE:ID for one of your own; without FILE, find its official one in
             $MS_ASSET_DIR/demos.
         cell: Which robots stood where, where the recording cannot say it.

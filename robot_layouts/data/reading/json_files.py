@@ -42,6 +42,7 @@ _Seed = Annotated[int, whole(0, MAX_SEED)]
 _Seeds = _Seed | list[_Seed] | None
 _Steps = Annotated[int, whole(1, MAX_STEPS)]
 _Mode = Name | dict[str, Name]
+FILE = "trajectory.h5"  # the first of a recording
 FORMAT = "robot-layouts recording 1"
 SUFFIX = ".manifest.json"
 FILE_NUMBER = "file_number"  # what all files but the first say in json and attributes
@@ -205,6 +206,18 @@ def recorded_task(path: Path) -> str:
         TrajectoryError: If the json cannot be read.
     """
     return _read(path)["env_info"]["env_id"]
+
+
+def describe_source(entry: EpisodeEntry, summary: RecordingSummary) -> str:
+    """Return the name of an episode's source: who acted, and who corrected."""
+    source = entry.source
+    if source is None:
+        named = (summary.source_type, summary.source_desc)
+        return " ".join(filter(None, named)) or "unknown"
+    actors: list[Mapping[str, Any]] = source.get("actors") or [source]
+    words = " and ".join(f"{a.get('kind', '')} {a.get('name', '')}".strip() for a in actors)
+    corrected: Mapping[str, Any] | None = source.get("corrects")
+    return words + (f", correcting {corrected.get('name', '')}" if corrected else "")
 
 
 def _read(path: Path) -> dict[str, Any]:

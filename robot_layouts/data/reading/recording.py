@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from robot_layouts.core.files import open_regular
 from robot_layouts.data.reading.hdf5 import Hdf5File, Shapes, damage_errors
+from robot_layouts.data.reading.hub import local_place
 from robot_layouts.data.reading.json_files import (
+    FILE,
     MAX_STEPS,
     SUFFIX,
     EpisodeEntry,
@@ -57,8 +59,6 @@ from tasks import TaskEnv
 from tasks.arrays import nested
 from tasks.episode import States
 from tasks.native.controllers import CONTROLLER
-
-FILE = "trajectory.h5"
 
 _FLAGS = ("success", "terminated", "truncated")
 _COLUMNS = ("rewards", *_FLAGS, "actor")
@@ -144,13 +144,16 @@ class Recording(Sequence[Trajectory]):
 
         Args:
             path: One h5 file, beside which its json must lie; or all that belong together, by their
-                folder, where the first is ``trajectory.h5``, or by their manifest.
+                folder, where the first is ``trajectory.h5``, or by their manifest; or
+                ``hub:OWNER/NAME[@REVISION]``, a recording on the Hugging Face Hub.
 
         Raises:
+            HubError: If it cannot be read from the Hub.
             TrajectoryError: If there is no such file, it or its json is of another kind or
                 damaged, its control mode is unknown, or it is not what the manifest lists.
         """
-        self.path, self.opened = first_file(path), Path(path)
+        self.opened = local_place(path)
+        self.path = first_file(self.opened)
         self.manifest = None if self.path == self.opened else read_manifest(self.path)
         if self.manifest is not None and not self.manifest.files:
             raise TrajectoryError(f"{manifest_path(self.path)} lists no files")
@@ -487,7 +490,7 @@ def _without_engine(described: Mapping[str, Any]) -> dict[str, Any]:
 
 def first_file(path: str | PathLike[str]) -> Path:
     """Return the h5 file, or the first one, of what `Recording` is given."""
-    place = Path(path)
+    place = local_place(path)
     if place.is_dir():
         return place / FILE
     if place.name.endswith(SUFFIX):
@@ -501,8 +504,9 @@ def all_files(path: str | PathLike[str]) -> list[Path]:
     Raises:
         TrajectoryError: If it has a manifest that cannot be read.
     """
-    first = first_file(path)
-    manifest = None if first == Path(path) else read_manifest(first)
+    place = local_place(path)
+    first = first_file(place)
+    manifest = None if first == place else read_manifest(first)
     return [file_path(first, i) for i in range(len(manifest.files) if manifest else 1)]
 
 

@@ -291,7 +291,7 @@ def save_suite(suite: Suite, path: str | PathLike[str]) -> None:
 
 
 def _suite(data: Any, folder: Path, import_tasks: bool) -> Suite:
-    top = _mapping(data, "a suite", TOP)
+    top = checked_mapping(data, "a suite", TOP)
     name = checked_name("a suite", top.get("name"))
     entries = top.get("tasks")
     if not isinstance(entries, list) or not entries:
@@ -307,7 +307,7 @@ def _suite(data: Any, folder: Path, import_tasks: bool) -> Suite:
 
 def _policies(given: Any, import_tasks: bool) -> dict[str, str]:
     """Return who plays, as written; tasks are looked up when it is played."""
-    found = _mapping(given, "policies")
+    found = checked_mapping(given, "policies")
     for task, policy in found.items():
         if not isinstance(policy, str):
             raise TaskError(f"the policy of {task} is {shown(policy)}; it must be MODULE:NAME")
@@ -333,8 +333,8 @@ def _cases(
     """Return the cases of an entry: one for each of its layouts."""
     named = entry.get("task") if isinstance(entry, Mapping) else entry
     try:
-        own = {"task": entry} if isinstance(entry, str) else _mapping(entry, "an entry", ENTRY)
-        about = {**shared, **own}
+        own = {"task": entry} if isinstance(entry, str) else entry
+        about = {**shared, **checked_mapping(own, "an entry", ENTRY)}
         for key in ("task", "seeds"):
             if key not in about:
                 raise TaskError(f"{key!r} is missing; it needs a task, and seeds unless all share")
@@ -362,7 +362,7 @@ def _places(about: Mapping[str, Any], name: str) -> list[tuple[str, Any]]:
         return [(name, about.get("layout", OWN))]
     if "layout" in about:
         raise TaskError("it has 'layout' and 'layouts'; the latter holds several, by name")
-    several = _mapping(about["layouts"], "layouts")
+    several = checked_mapping(about["layouts"], "layouts")
     if not several:
         raise TaskError(f"layouts is empty; leave it out for the task's {OWN}")
     return [(name if key == OWN else f"{name}.{key}", value) for key, value in several.items()]
@@ -376,7 +376,13 @@ def _entry(case: Case, folder: Path) -> dict[str, Any]:
     return about
 
 
-def _mapping(value: Any, what: str, keys: Sequence[str] | None = None) -> Mapping[str, Any]:
+def checked_mapping(value: Any, what: str, keys: Sequence[str] | None = None) -> Mapping[str, Any]:
+    """Return a mapping that has no other keys.
+
+    Raises:
+        TaskError: If it is no mapping.
+        UnknownNameError: If it has another key.
+    """
     if not isinstance(value, Mapping):
         raise TaskError(f"{what} is {shown(value)}; it takes a mapping (key: value)")
     for key in value:
@@ -400,7 +406,7 @@ def read_layout(value: Any, folder: Path) -> Layout | None:
     if value == OWN:
         return None
     if isinstance(value, str):
-        return Layout.load(_below(folder, value))
+        return Layout.load(file_below(folder, value))
     if isinstance(value, Mapping) and "preset" in value:
         return _preset(value, folder)
     if isinstance(value, Mapping) and "robots" in value:
@@ -433,14 +439,14 @@ def read_randomization(value: Any, folder: Path) -> Randomization | None:
     if value is None:
         return None
     if isinstance(value, str):
-        return Randomization.load(_below(folder, value))
+        return Randomization.load(file_below(folder, value))
     if not isinstance(value, Mapping):
         raise TaskError(f"randomization is {shown(value)}; it takes a file, or axes by name")
     return Randomization.from_json(value)
 
 
-def _below(folder: Path, name: str) -> Path:
-    """Return the path of a file below a folder; another person's suite reads no other.
+def file_below(folder: Path, name: str) -> Path:
+    """Return the path of a file below a folder; another person's file reads no other.
 
     Raises:
         TaskError: If it is not below it, links followed.
@@ -449,8 +455,8 @@ def _below(folder: Path, name: str) -> Path:
         if Path(os.path.realpath(folder / name)).is_relative_to(os.path.realpath(folder)):
             return folder / name
     raise TaskError(
-        f"{shown(name)} is no file below the suite's folder, and a suite includes no others; copy"
-        " it there"
+        f"{shown(name)} is no file below the folder of what names it, which includes no others;"
+        " copy it there"
     )
 
 

@@ -1,0 +1,1 @@
+"""Data sets for others: on the Hugging Face Hub, with a card."""

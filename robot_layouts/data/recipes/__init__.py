@@ -1,0 +1,1 @@
+"""Data sets as recipes: files that say how recordings and exports are made again."""

@@ -1,0 +1,1 @@
+"""Environments that another process steps, over a socket."""

@@ -1,0 +1,123 @@
+"""An environment that another process serves, as Gymnasium's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from robot_layouts.core.importing import optional
+from robot_layouts.data.playing.served.client import pack, unpack
+from robot_layouts.data.serving.world import CALL, ERROR, read_space
+from robots import RobotLayoutsError
+
+SECONDS = 60.0  # for an answer: the first one takes as long as making the world
+MOST_BYTES = 2**28  # of an observation
+
+
+class RemoteTaskError(RobotLayoutsError, RuntimeError):
+    """A served environment that refuses what it was asked, or cannot be reached."""
+
+
+class RemoteEnv(gymnasium.Env[Any, Any]):
+    """One environment of ``robot-layouts serve``; its world goes when it is closed.
+
+    Attributes:
+        about: What the server says of it: task, instruction, robots by place, arms, action split,
+            control mode and frequency (Hz), most steps of an episode, observation mode, version.
+        action_space: Action, (A,).
+        observation_space: Observation.
+    """
+
+    def __init__(self, address: str, seconds: float = SECONDS) -> None:
+        """Connect.
+
+        Args:
+            address: What the command printed: ``ws://HOST:PORT/?token=TOKEN``.
+            seconds: Within which each answer has to arrive (s).
+
+        Raises:
+            RemoteTaskError: If nothing is served there, or the server takes no more clients.
+            MissingPackageError: If websockets is not installed.
+        """
+        client = optional("websockets.sync.client", "a served task needs websockets", "served")
+        self._errors = optional("websockets.exceptions", "a served task needs websockets", "served")
+        self._name, self._seconds = address.partition("?")[0], seconds
+        try:
+            self._socket = client.connect(
+                address, compression=None, max_size=MOST_BYTES, ping_interval=None
+            )
+        except self._errors.InvalidStatus as error:
+            raise self._error(error.response.body.decode(errors="replace").strip()) from None
+        except (OSError, self._errors.WebSocketException) as error:
+            raise self._error(f"cannot be reached: {error}") from None
+        self.about = self._receive()
+        self.action_space = read_space(self.about.pop("action_space"))
+        self.observation_space = read_space(self.about.pop("observation_space"))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode in a world that is built anew, as every episode of its seed begins.
+
+        Args:
+            seed: Its seed; None lets the random streams run on.
+            options: Not for this environment.
+
+        Returns:
+            Observation, whose arrays cannot be written to, and info.
+
+        Raises:
+            RemoteTaskError: If the seed is invalid; nothing has changed then.
+        """
+        own = int(seed) if isinstance(seed, np.integer) else seed
+        answer = self._ask({CALL: "reset", "seed": own})
+        return answer["observation"], answer["info"]
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Advance by one control step.
+
+        Args:
+            action: Shape (A,), or the numbers of each robot, (a,), by its place.
+
+        Returns:
+            Observation, reward, terminated, truncated and info.
+
+        Raises:
+            RemoteTaskError: If the action is invalid; the world is as it was then.
+        """
+        parts = isinstance(action, Mapping)
+        sent = {n: np.asarray(p) for n, p in action.items()} if parts else np.asarray(action)
+        answer = self._ask({CALL: "step", "action": sent})
+        return (
+            answer["observation"],
+            *(answer[name] for name in ("reward", "terminated", "truncated", "info")),
+        )
+
+    def close(self) -> None:
+        """Close the connection; closing twice is allowed."""
+        self._socket.close()
+
+    def _ask(self, message: dict[str, Any]) -> dict[str, Any]:
+        try:
+            self._socket.send(pack(message))
+        except self._errors.ConnectionClosed as error:
+            raise self._error(f"closed the connection: {error}") from None
+        answer = self._receive()
+        if ERROR in answer:
+            raise RemoteTaskError(answer[ERROR])
+        return answer
+
+    def _receive(self) -> dict[str, Any]:
+        try:
+            return unpack(self._socket.recv(timeout=self._seconds))
+        except TimeoutError:
+            self.close()  # its answer would come as that to another question
+            raise self._error(f"sent no answer within {self._seconds:g} s") from None
+        except self._errors.ConnectionClosed as error:
+            raise self._error(f"closed the connection: {error}") from None
+
+    def _error(self, what: str) -> RemoteTaskError:
+        return RemoteTaskError(f"the environment at {self._name}: {what}")

@@ -1,0 +1,194 @@
+"""Environments over a socket: an episode from another process is that of this one, to the bit."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from queue import Queue
+
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosedError
+from websockets.sync.client import connect
+
+import tasks
+from layouts.commands import Server
+from robot_layouts.__main__ import main
+from robot_layouts.data.playing.served.client import pack, unpack
+from robot_layouts.data.serving.client import RemoteEnv, RemoteTaskError
+from robot_layouts.data.serving.server import MOST_BYTES, Admission, serve
+from robots import TaskError
+from tasks.interfaces.gymnasium import info_row, row
+from tests.data import expert_plays
+from tests.data.plays import at_random
+
+TASK, TWO = "PushT-v1", "TwoRobotPickCube-v1"
+ROOT = Path(__file__).parents[2]
+
+
+def start(task: str = TASK, **more) -> str:
+    """Serve a task in a thread of this process, for as long as that lasts; returns the address."""
+    ready: Queue[str] = Queue()
+    settings = {"server": Server(port=0), "on_ready": ready.put, **more}
+    threading.Thread(target=serve, args=(task,), kwargs=settings, daemon=True).start()
+    return ready.get(timeout=60)
+
+
+@pytest.fixture(scope="module")
+def address() -> str:
+    return start(admission=Admission(clients=3))
+
+
+@pytest.fixture
+def env(address) -> Iterator[RemoteEnv]:
+    with closing(RemoteEnv(address)) as remote:
+        yield remote
+
+
+def assert_same(task, remote, seed, actions):
+    """Compare every bit of an episode that is stepped here and there."""
+    obs, info = task.reset(seed, {"reconfigure": True})
+    seen, told = remote.reset(seed=seed)
+    assert told == info_row(info, seed)
+    assert row(obs).tobytes() == seen.tobytes()
+    for action in actions:
+        obs, reward, terminated, truncated, info = task.step(action)
+        there = remote.step(action)
+        assert there[0].tobytes() == row(obs).tobytes()
+        assert there[1:4] == (reward[0].item(), bool(terminated[0]), bool(truncated[0]))
+        assert there[4] == info_row(info, seed)
+
+
+def test_an_episode_is_the_same_to_the_last_bit_whatever_was_played_before(env):
+    with closing(tasks.make(TASK)) as task:
+        for seed in (3, 1):
+            assert_same(task, env, seed, at_random(task, seed)[:10])
+
+
+def test_each_client_has_a_world_of_its_own(address, env):
+    with closing(tasks.make(TASK)) as task, closing(RemoteEnv(address)) as other:
+        other.reset(seed=7)
+        task.reset(3, {"reconfigure": True})
+        env.reset(seed=np.int64(3))
+        for action in at_random(task, 3)[:5]:
+            other.step(-action)
+            obs = task.step(action)[0]
+            assert env.step(action)[0].tobytes() == row(obs).tobytes()
+
+
+def test_what_is_served_is_said_first(env):
+    with closing(tasks.make(TASK)) as task:
+        assert env.action_space == task.single_action_space
+        assert env.observation_space == task.single_observation_space
+        assert env.about["robots"] == {"arm": "panda_stick"}
+        assert env.about["action_split"] == {"arm": [0, 7]}
+        assert env.about["control_mode"] == "pd_joint_delta_pos"
+        assert env.about["instruction"].endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda env: env.step(np.zeros(8)), "shape"),
+        (lambda env: env.step(np.full(7, np.nan)), "action number 0 is nan"),
+        (lambda env: env.step({"amr": np.zeros(7)}), "amr"),
+        (lambda env: env.step("left"), "numbers are needed"),
+        (lambda env: env.reset(seed=-1), "seed"),
+        (lambda env: env.reset(seed=[1, 2]), "seed"),
+        (lambda env: env._ask({"call": "rest"}), "Did you mean 'reset'?"),
+        (lambda env: env._ask({"call": "step", "actoin": 1}), "Did you mean 'action'?"),
+        (lambda env: env._ask({}), "unknown call None"),
+        (lambda env: env._ask(["reset"]), "a message is a mapping"),
+    ],
+)
+def test_bad_input_is_answered_in_a_sentence_and_the_world_is_kept(env, call, message):
+    with closing(tasks.make(TASK)) as task:
+        actions = at_random(task, 2)[:4]
+        task.reset(2, {"reconfigure": True})
+        env.reset(seed=2)
+        task.step(actions[0])
+        env.step(actions[0])
+        with pytest.raises((RemoteTaskError, TypeError), match=message):
+            call(env)
+        assert env.step(actions[1])[0].tobytes() == row(task.step(actions[1])[0]).tobytes()
+
+
+def test_an_episode_has_to_begin(env):
+    with pytest.raises(RemoteTaskError, match="no episode has begun; reset first"):
+        env.step(np.zeros(7))
+
+
+@pytest.mark.parametrize("data", [b"\xc1", b"", "reset", pack(7), b"\x93" * 5000])
+def test_what_is_no_message_is_answered(address, data):
+    with connect(address) as socket:
+        socket.recv()
+        socket.send(data)
+        assert set(unpack(socket.recv(timeout=10))) == {"error"}
+        socket.send(pack({"call": "reset", "seed": 0}))
+        assert "observation" in unpack(socket.recv(timeout=60))
+
+
+def test_a_message_of_a_megabyte_is_not_read(address):
+    with connect(address) as socket:
+        socket.recv()
+        socket.send(bytes(MOST_BYTES + 1))
+        with pytest.raises(ConnectionClosedError, match="1009"):
+            socket.recv(timeout=10)
+
+
+def test_only_those_with_the_token_come_in(address):
+    for wrong in (address.partition("?")[0], f"{address}x"):
+        with pytest.raises(RemoteTaskError, match="The token is missing or another"):
+            RemoteEnv(wrong)
+    token = address.partition("=")[2]
+    with pytest.raises(RemoteTaskError) as error:
+        RemoteEnv(f"ws://127.0.0.1:9/?token={token}")
+    assert token not in str(error.value)
+
+
+def test_no_more_clients_come_in_than_it_takes(address):
+    held = [RemoteEnv(address) for _ in range(3)]
+    with pytest.raises(RemoteTaskError, match="As many clients as the server takes"):
+        RemoteEnv(address)
+    for one in held:
+        one.close()
+
+
+def test_a_web_page_does_not_come_in(address):
+    with pytest.raises(Exception, match="403"):
+        connect(address, origin="http://example.org")
+
+
+def test_a_port_that_is_in_use_is_named(address):
+    port = int(address.partition("/?")[0].rpartition(":")[2])
+    with pytest.raises(TaskError, match=f"cannot listen at 127.0.0.1:{port}: .*; choose --host or"):
+        serve(TASK, server=Server(port=port), on_ready=print)
+
+
+def test_a_wrong_task_is_refused_before_anything_is_served(capsys):
+    assert main(["serve", "PushTee-v1"]) == 2
+    assert "Did you mean 'PushT-v1'?" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_an_experts_episode_of_two_arms_from_another_process():
+    words = [sys.executable, "-m", "robot_layouts", "serve", TWO, "--port", "0", "--no-token"]
+    where = {**os.environ, "PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=where)
+    try:
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert line.startswith(f"{TWO}: ws://127.0.0.1:")
+        env = RemoteEnv(line.partition(": ")[2].strip())
+        assert_same(expert_plays.task(TWO), env, 0, expert_plays.plan(TWO, 0))
+        assert env.step(np.zeros(16))[4]["success"] in (True, False)
+        process.terminate()
+        assert process.wait(30) == 0
+    finally:
+        process.kill()
+        process.communicate()
