@@ -5,6 +5,7 @@ from __future__ import annotations
 from benchmarks.bench.run import bench, tables
 from benchmarks.collisions import collisions
 from benchmarks.conversions import conversions
+from benchmarks.engines import engines
 from benchmarks.experts import experts
 from benchmarks.gallery.pages import gallery
 from benchmarks.learned import imitation, reinforcement
@@ -40,6 +41,7 @@ PROGRAM = Program(
             placing,
             packaged,
             objects,
+            engines,
             experts,
             skills,
             conversions,

@@ -16,6 +16,7 @@ _FOR_USERS = {
     "record": "robot_layouts.data.playing_commands:record",
     "teleop": "robot_layouts.data.commands:teleop",
     "replay": "robot_layouts.data.recording.replaying:replay_command",
+    "compare-engines": "robot_layouts.data.comparison:compare_command",
     "certify": "robot_layouts.data.playing_commands:certify",
     "convert": "robot_layouts.data.recording.convert:convert_command",
     "merge": "robot_layouts.data.recording.merge:merge_command",

@@ -20,6 +20,7 @@ import hypothesis
 import pytest
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # read when torch is imported
+os.environ.setdefault("MUJOCO_GL", "egl")  # read when mujoco is imported
 
 # A shell's background jobs ignore these, and so would every process that a test sends one.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

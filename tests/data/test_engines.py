@@ -8,6 +8,7 @@ import pytest
 import tasks
 from robot_layouts import evaluate
 from robot_layouts.__main__ import main
+from robot_layouts.data.comparison import SEEN, compare
 from robot_layouts.data.recording.recorder import Recorder
 from tasks.episode import play
 
@@ -72,3 +73,22 @@ def test_a_description_says_that_a_clone_has_other_physics(capsys):
     printed = " ".join(capsys.readouterr().out.split())
     assert "simulator mujoco" in printed
     assert "the same task with other physics" in printed
+
+
+def test_engines_are_compared_by_the_same_actions(capsys):
+    words = ("--episodes", "1", "--planned-in", "mujoco")
+    assert main(["compare-engines", TASK, *words]) == 0
+    printed = capsys.readouterr().out
+    assert "sapien3: 1 of 1 solved" in printed
+    assert "mujoco: 1 of 1 solved" in printed
+
+
+def test_what_stands_still_in_both_is_at_the_same_place():
+    envs = {name: tasks.make(TASK, simulator=name) for name in ("sapien3", "mujoco")}
+    still, moved = np.zeros((3, 8), np.float32), np.ones((3, 8), np.float32)
+    still[:, 7] = moved[:, 7] = 1.0  # open
+    assert compare(envs, 0, still).since is None
+    compared = compare(envs, 0, moved)
+    assert (compared.steps, compared.since, compared.what) == (3, 1, "arm")
+    assert SEEN < compared.apart < 0.02
+    assert compared.solved == {"sapien3": False, "mujoco": False}

@@ -4,18 +4,19 @@ import dataclasses
 
 import numpy as np
 import pytest
+import torch
 
 import tasks
 from layouts import face_to_face, single
 from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Friction, Plane, Sphere
 from robot_layouts.experts import find_expert
-from robot_layouts.simulation import PhysicsSettings, Simulation
+from robot_layouts.simulation import Camera, PhysicsSettings, Simulation
 from robot_layouts.simulation.backend import SIMULATORS
 from robot_layouts.simulation.checks.overlaps import stand
 from robots import CONTROL_MODES, JointGroup, SimulationError
 from tests.quick import quick_cases
 
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 from robot_layouts.simulation.mujoco.drives import LedGroup  # noqa: E402
 
 TASKS = ("PickCube-v1", "TwoRobotPickCube-v1", "PegInsertionSide-v1", "Relay-v1", "PushT-v1")
@@ -153,15 +154,17 @@ def test_a_robot_moves_as_in_sapien(mode):
     assert apart.max() < FREE_MOTION.get(mode, 0.05)
 
 
-def test_two_runs_and_any_number_of_worlds_have_the_same_bits():
+def test_two_runs_and_any_number_of_worlds_and_threads_have_the_same_bits():
     actions = np.random.default_rng(0).uniform(-1, 1, (10, 1, 16)).astype(np.float32)
     runs = []
-    for count in (1, 1, 3):
+    for count, threads in ((1, 1), (1, 1), (3, 1), (3, 2)):
+        torch.set_num_threads(threads)
         env = made("TwoRobotPickCube-v1", num_envs=count)
         env.reset(seed=0)
         runs.append([env.step(np.tile(action, (count, 1)))[0][0].tolist() for action in actions])
         env.close()
-    assert runs[0] == runs[1] == runs[2]
+    torch.set_num_threads(1)
+    assert runs[0] == runs[1] == runs[2] == runs[3]
 
 
 def test_a_state_that_is_set_goes_on_as_it_did():
@@ -226,6 +229,49 @@ def test_arms_that_touch_are_named():
 def test_what_mujoco_cannot_do_is_refused(settings, sentence):
     with pytest.raises(SimulationError, match=sentence):
         built(physics=PhysicsSettings(**settings))
+
+
+@pytest.fixture(scope="module")
+def draws():
+    """Skip what draws where OpenGL does not."""
+    try:
+        mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 8, 8).close()
+    except Exception as error:
+        pytest.skip(f"MuJoCo draws nothing here: {error}")
+
+
+@pytest.mark.usefixtures("draws")
+def test_a_picture_shows_what_is_where_and_how_far_away():
+    above = Camera(eye=(1.0, 0.0, 1.0), target=(1.0, 0.0, 0.0), width=33, height=33, fov=0.2)
+    red = dataclasses.replace(CUBE, color=(1.0, 0.0, 0.0, 1.0))
+    simulation = built(("cube", red, (1.0, 0.0, 0.02)), visuals=True)
+    textures = ("rgb", "depth", "position", "segmentation")
+    (view,) = simulation.look(0, {"above": above}, textures, markers=False)
+    middle = {name: image[16, 16].tolist() for name, image in view.images.items()}
+    assert middle["depth"] == pytest.approx([960], abs=1)
+    assert middle["position"] == pytest.approx([0, 0, -960], abs=1)
+    assert simulation.backend.segments()[middle["segmentation"][0]].name == "cube"
+    assert middle["rgb"][0] > 2 * max(middle["rgb"][1:])
+    assert view.images["depth"][0, 0, 0] == pytest.approx(1000, abs=1)  # the floor
+    np.testing.assert_allclose(view.cam2world_gl[:3, 3], above.eye)
+    with pytest.raises(SimulationError, match="draws no 'normal'; it draws rgb, depth"):
+        simulation.look(0, {"above": above}, ("normal",), markers=False)
+
+
+@pytest.mark.usefixtures("draws")
+def test_markers_are_there_for_people_alone():
+    def build(world, number):
+        world.add("goal", dataclasses.replace(CUBE, collides=False), kind="kinematic", marker=True)
+
+    simulation = Simulation(single({"arm": "panda"}), build, 1, simulator="mujoco", visuals=True)
+    stand(simulation)
+    simulation.worlds[0].set_pose("goal", (1.0, 0.0, 0.5))
+    camera = {"above": Camera(eye=(1.0, 0.0, 1.0), target=(1.0, 0.0, 0.0), width=9, height=9)}
+    seen = [
+        simulation.look(0, camera, ("segmentation",), markers=markers)[0].images["segmentation"]
+        for markers in (True, False)
+    ]
+    assert (seen[0][4, 4, 0] > 0, seen[1][4, 4, 0]) == (True, 0)
 
 
 EXPERTS = ("TwoRobotPickCube-v1", "StackCube-v1", "TwoRobotLiftBar-v1", "CellPutAway-v1")

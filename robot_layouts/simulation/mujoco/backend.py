@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,8 @@ from robot_layouts.simulation.mujoco.drives import JointDrives
 from robot_layouts.simulation.mujoco.extents import extent_of
 from robot_layouts.simulation.mujoco.library import mujoco
 from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, substeps_of
+from robot_layouts.simulation.mujoco.pictures import Pictures
+from robot_layouts.simulation.mujoco.threads import Threads
 from robot_layouts.simulation.mujoco.world import MujocoWorld
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
 from robot_layouts.simulation.scene.variation import Variation
@@ -61,6 +65,8 @@ class MujocoBackend:
         self.worlds: list[MujocoWorld] = []
         self._robots: RobotModels | None = None
         self._arms: list[ArmWatcher] | None = None
+        self._threads = Threads()
+        self._pictures = Pictures()
 
     def build(self, worlds: Mapping[int, World]) -> Built:
         """Build worlds; see `Backend`."""
@@ -120,7 +126,7 @@ class MujocoBackend:
         """Advance worlds; see `Backend`."""
         for i in env_ids:
             self._drives.pull(i)
-            self.worlds[i].step(substeps)
+        self._threads.run([partial(self.worlds[i].step, substeps) for i in env_ids])
 
     def read(self) -> Readout:
         """Return poses and joints; see `Backend`."""
@@ -175,11 +181,12 @@ class MujocoBackend:
         self, env: int, cameras: Mapping[str, AnyCamera], textures: Sequence[str], *, markers: bool
     ) -> Callable[[], list[View]]:
         """Begin to draw what cameras see; see `Backend`."""
-        raise SimulationError("simulator 'mujoco' draws no pictures yet; take 'sapien3'")
+        views = self._pictures.look(self.worlds[env], cameras, textures, markers=markers)
+        return lambda: views
 
     def describe_graphics(self) -> dict[str, str]:
         """Return on what pictures are drawn; see `Backend`."""
-        return {}
+        return {"engine": f"MuJoCo {mujoco.__version__}", "driver": os.environ.get("MUJOCO_GL", "")}
 
     def segments(self) -> dict[int, Part]:
         """Return what segmentation's numbers stand for; see `Backend`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from objects.shapes import (
     Capsule,
     ConvexHull,
     Cylinder,
+    Floor,
     Friction,
     Mesh,
     Plane,
@@ -20,9 +22,11 @@ from objects.shapes import (
 )
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation.mujoco.library import mujoco
+from robot_layouts.simulation.mujoco.visuals import add_drawn
 from robot_layouts.simulation.world import WorldBody, part_name
 from robots.urdf.mesh_files import read_corners
 
+HIDDEN = 3  # group of geoms that collide; see `DRAWN`
 PREFIX = "/"  # of bodies' names, which no place of a layout begins with
 # MuJoCo's planes face along +z, its cylinders and capsules lie along it; ours along +x (wxyz).
 _ALONG_X = (0.5**0.5, 0.0, 0.5**0.5, 0.0)
@@ -32,6 +36,7 @@ _TYPES: dict[type[Shape], Any] = {
     Cylinder: mujoco.mjtGeom.mjGEOM_CYLINDER,
     Capsule: mujoco.mjtGeom.mjGEOM_CAPSULE,
     Plane: mujoco.mjtGeom.mjGEOM_PLANE,
+    Floor: mujoco.mjtGeom.mjGEOM_PLANE,
     ConvexHull: mujoco.mjtGeom.mjGEOM_MESH,
     Mesh: mujoco.mjtGeom.mjGEOM_MESH,
 }
@@ -39,38 +44,100 @@ _KINDS = {"slide": mujoco.mjtJoint.mjJNT_SLIDE, "turn": mujoco.mjtJoint.mjJNT_HI
 _WEIGHTLESS = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0], "explicitinertial": True}
 
 
-def add_body(spec: Any, body: WorldBody, friction: Friction, solref: list[float]) -> None:
-    """Add a body and the parts that its joints move.
+@dataclass(frozen=True, eq=False)
+class BodyMaker:
+    """Adds bodies to a model.
 
-    Args:
+    Attributes:
         spec: MuJoCo's description of the model.
-        body: What a task declared.
         friction: Of shapes that name none.
-        solref: How soft its contacts are, in MuJoCo's numbers.
+        solref: How soft contacts are, in MuJoCo's numbers.
+        drawn: Whether to add what pictures need.
     """
-    moves = body.kind == "dynamic"
-    held = {} if moves and _has_mass(body.shapes) else _WEIGHTLESS
-    made = spec.worldbody.add_body(
-        name=PREFIX + body.name, pos=body.position, quat=body.quaternion, mocap=not moves, **held
-    )
-    if moves:
-        made.add_freejoint(name=PREFIX + body.name)
-    _add_shapes(spec, made, body.shapes, friction, solref)
-    parts: dict[str | None, Any] = {None: made}
-    for joint in body.joints:
-        part = parts[joint.carrier].add_body(name=PREFIX + part_name(body.name, joint.name))
-        # What a joint joins does not collide.
-        spec.add_exclude(bodyname1=parts[joint.carrier].name, bodyname2=part.name)
-        part.add_joint(name=part.name, **_joint_numbers(joint, solref))
-        _add_shapes(spec, part, joint.parts, friction, solref)
-        parts[joint.name] = part
+
+    spec: Any
+    friction: Friction
+    solref: list[float]
+    drawn: bool
+
+    def add(self, body: WorldBody) -> None:
+        """Add a body and the parts that its joints move."""
+        moves = body.kind == "dynamic"
+        held = {} if moves and _has_mass(body.shapes) else _WEIGHTLESS
+        pose = {"pos": body.position, "quat": body.quaternion}
+        made = self.spec.worldbody.add_body(
+            name=PREFIX + body.name, mocap=not moves, **pose, **held
+        )
+        if moves:
+            made.add_freejoint(name=PREFIX + body.name)
+        self._add_shapes(made, body.shapes, marker=body.marker)
+        parts: dict[str | None, Any] = {None: made}
+        for joint in body.joints:
+            carrier = parts[joint.carrier]
+            part = carrier.add_body(name=PREFIX + part_name(body.name, joint.name))
+            # What a joint joins does not collide.
+            self.spec.add_exclude(bodyname1=carrier.name, bodyname2=part.name)
+            part.add_joint(name=part.name, solref_limit=self.solref, **_joint_numbers(joint))
+            self._add_shapes(part, joint.parts, marker=body.marker)
+            parts[joint.name] = part
+
+    def _add_shapes(self, body: Any, shapes: tuple[Shape, ...], *, marker: bool) -> None:
+        for shape in shapes:
+            if self.drawn and shape.visible:
+                add_drawn(self.spec, body, shape, self._geom(shape), marker=marker)
+            if shape.collides:
+                own = self.friction if shape.friction is None else shape.friction
+                body.add_geom(
+                    **self._geom(shape),
+                    group=HIDDEN,
+                    density=shape.density,
+                    friction=[own.static, 0.005, 0.0001],
+                    solref=self.solref,
+                )
+
+    def _geom(self, shape: Shape) -> dict[str, Any]:
+        """Return type, pose and size of the geom that stands for a shape."""
+        along = isinstance(shape, (Cylinder, Capsule, Plane))
+        turned = multiply(shape.quaternion, _ALONG_X) if along else shape.quaternion
+        return {
+            "type": _TYPES[type(shape)],
+            "pos": shape.position,
+            "quat": turned,
+            **self._size(shape),
+        }
+
+    def _size(self, shape: Shape) -> dict[str, Any]:
+        match shape:
+            case Box():
+                return {"size": shape.half_size}
+            case Sphere():
+                return {"size": [shape.radius, 0.0, 0.0]}
+            case Cylinder() | Capsule():
+                return {"size": [shape.radius, shape.half_length, 0.0]}
+            case Plane():
+                return {"size": [0.0, 0.0, 1.0]}
+            case Floor():
+                return {"size": [shape.size / 2, shape.size / 2, 1.0]}
+            case ConvexHull():
+                return {"meshname": self._add_hull(np.array(shape.corners))}
+            case Mesh(file=file) if shape.collides:
+                corners = read_corners(str(file), shape.scale, str(file), str(file))
+                return {"meshname": self._add_hull(corners)}
+            case _:  # a mesh that is only drawn
+                return {}
+
+    def _add_hull(self, corners: Floats) -> str:
+        name = f"{PREFIX}hull{len(self.spec.meshes)}"
+        inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        self.spec.add_mesh(name=name, uservert=corners.ravel().tolist(), inertia=inertia)
+        return name
 
 
 def _has_mass(shapes: tuple[Shape, ...]) -> bool:
     return any(shape.collides and not isinstance(shape, Plane) for shape in shapes)
 
 
-def _joint_numbers(joint: Joint, solref: list[float]) -> dict[str, Any]:
+def _joint_numbers(joint: Joint) -> dict[str, Any]:
     return {
         "type": _KINDS[joint.kind],
         "axis": joint.axis,
@@ -80,57 +147,4 @@ def _joint_numbers(joint: Joint, solref: list[float]) -> dict[str, Any]:
         "springref": joint.rest,
         "damping": joint.damping,
         "frictionloss": joint.friction,
-        "solref_limit": solref,
     }
-
-
-def _add_shapes(
-    spec: Any, body: Any, shapes: tuple[Shape, ...], friction: Friction, solref: list[float]
-) -> None:
-    for shape in shapes:
-        if not shape.collides:
-            continue
-        own = friction if shape.friction is None else shape.friction
-        body.add_geom(
-            type=_TYPES[type(shape)],
-            pos=shape.position,
-            quat=_turned(shape),
-            density=shape.density,
-            friction=[own.static, 0.005, 0.0001],
-            solref=solref,
-            **_size(spec, shape),
-        )
-
-
-def _turned(shape: Shape) -> Floats:
-    along = isinstance(shape, (Cylinder, Capsule, Plane))
-    return multiply(shape.quaternion, _ALONG_X) if along else np.array(shape.quaternion)
-
-
-def _size(spec: Any, shape: Shape) -> dict[str, Any]:
-    match shape:
-        case Box():
-            return {"size": shape.half_size}
-        case Sphere():
-            return {"size": [shape.radius, 0.0, 0.0]}
-        case Cylinder() | Capsule():
-            return {"size": [shape.radius, shape.half_length, 0.0]}
-        case Plane():
-            return {"size": [0.0, 0.0, 1.0]}
-        case ConvexHull():
-            return {"meshname": _add_hull(spec, np.array(shape.corners))}
-        case Mesh():
-            corners = read_corners(str(shape.file), shape.scale, str(shape.file), str(shape.file))
-            return {"meshname": _add_hull(spec, corners)}
-        case _:
-            raise TypeError(f"no geom for {type(shape).__name__}")
-
-
-def _add_hull(spec: Any, corners: Floats) -> str:
-    name = f"{PREFIX}hull{len(spec.meshes)}"
-    spec.add_mesh(
-        name=name,
-        uservert=corners.ravel().tolist(),
-        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
-    )
-    return name

@@ -17,9 +17,10 @@ from layouts.export.cell import ExportedCell, RobotSource, Standing
 from layouts.export.mjcf import mjcf_of
 from objects.shapes import Plane
 from robot_layouts.simulation.backend import Built, BuiltRobot, Part
-from robot_layouts.simulation.mujoco.bodies import PREFIX, add_body
+from robot_layouts.simulation.mujoco.bodies import PREFIX, BodyMaker
 from robot_layouts.simulation.mujoco.friction import set_friction
 from robot_layouts.simulation.mujoco.library import mujoco
+from robot_layouts.simulation.mujoco.visuals import add_lamps
 from robot_layouts.simulation.physics import PhysicsSettings
 from robot_layouts.simulation.speeds import joint_speeds
 from robot_layouts.simulation.world import World
@@ -69,9 +70,12 @@ class RobotModels:
         for joint in spec.joints:
             joint.solref_limit = solref
         self._set_friction(spec, settings.friction.static)
+        maker = BodyMaker(spec, settings.friction, solref, drawn=bool(world.visuals))
         for body in world.bodies.values():
             if body.part_of is None:
-                add_body(spec, body, settings.friction, solref)
+                maker.add(body)
+        if maker.drawn:
+            add_lamps(spec, shadows=world.shadows)
         set_friction(spec, world, settings.friction.static, solref)
         self._let_floors_through(spec, world)
         model = spec.compile()

@@ -16,6 +16,7 @@ from robot_layouts.simulation.mujoco.extents import lowest_of
 from robot_layouts.simulation.mujoco.friction import vary_friction
 from robot_layouts.simulation.mujoco.library import mujoco
 from robot_layouts.simulation.mujoco.model import Inventory
+from robot_layouts.simulation.scene.looks import AS_DECLARED
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.world import World, WorldBody
 from robots import SimulationError
@@ -28,7 +29,8 @@ class MujocoWorld:
 
     Attributes:
         declared: What the task declared.
-        model: MuJoCo's model, which worlds that are alike share until one of them varies.
+        model: MuJoCo's model.
+        as_built: The same before the world was varied; worlds that are alike share it.
         data: MuJoCo's state of it.
         index: Where everything stands.
     """
@@ -43,7 +45,7 @@ class MujocoWorld:
             inner: How many steps of MuJoCo's make one of physics.
         """
         self.declared, self.index = declared, index
-        self.model = self._as_built = model
+        self.model = self.as_built = model
         self.data: Any = mujoco.MjData(model)
         self._inner, self._current = inner, False
         self.before_each: Callable[[], None] | None = None
@@ -196,7 +198,12 @@ class MujocoWorld:
                 "MuJoCo knows no coefficient of friction of joints, which joint_friction varies;"
                 " leave it out of the randomization, or take simulator='sapien3'"
             )
-        self.model = model = copy.copy(self._as_built)
+        if variation.looks not in (None, AS_DECLARED):
+            raise SimulationError(
+                "simulator 'mujoco' draws everything as it is declared; leave what varies in"
+                " pictures out of the randomization, or take simulator='sapien3'"
+            )
+        self.model = model = copy.copy(self.as_built)
         find = self.index.body
         for part, factor in variation.mass.items():
             body = find(part.robot, part.name)
