@@ -7,7 +7,9 @@ be settled before. Processes that the program begins inherit it.
 from __future__ import annotations
 
 import os
+import platform
 import shutil
+import sys
 from collections.abc import Sequence
 from typing import Annotated, NoReturn
 
@@ -29,6 +31,8 @@ def portable(program: Annotated[Sequence[str], Word("PROGRAM", nargs="...")] = (
     Raises:
         RobotLayoutsError: If there is no such program.
     """
+    if (sys.platform, platform.machine()) != ("linux", "x86_64"):
+        raise SimulationError("`robot-layouts portable` needs Linux on an x86-64 processor")
     if program:
         _become(program)
     for name, value in _variables().items():

@@ -11,6 +11,7 @@ from os import PathLike
 from typing import Any, BinaryIO
 
 from robot_layouts.core.errors import UnreadableFileError
+from robot_layouts.core.operating_system import READING
 
 MAX_JSON_DEPTH = 64  # arrays and objects inside one another; a recording's json has 7
 _BLOCK = 2**16  # bytes
@@ -33,7 +34,7 @@ def open_regular(path: str | PathLike[str]) -> BinaryIO:
     """
     try:
         _expect_regular(path, os.stat(path))  # opening a device may do something
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        descriptor = os.open(path, READING)
         try:
             _expect_regular(path, os.fstat(descriptor))  # it may have been replaced meanwhile
             return os.fdopen(descriptor, "rb")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, TypedDict
@@ -12,6 +11,7 @@ import numpy as np
 from layouts import Layout
 from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_choice, checked_flag, checked_whole, shown
+from robot_layouts.core.operating_system import memory
 from robot_layouts.simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
 from robot_layouts.simulation.backend import SIMULATORS
 from robot_layouts.simulation.physics import substeps
@@ -229,11 +229,11 @@ def check_control_mode(layout: Layout, mode: object) -> None:
 
 def _check_count(num_envs: object) -> None:
     count = checked_whole("num_envs", num_envs, 1, None, TaskError)
-    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    if count * LEAST_BYTES > memory:
+    present = memory()
+    if present is not None and count * LEAST_BYTES > present:
         raise TaskError(
             f"num_envs is {count}; that takes {count * LEAST_BYTES / 1e9:.3g} GB at least, and this"
-            f" machine has {memory / 1e9:.3g} GB"
+            f" machine has {present / 1e9:.3g} GB"
         )
 
 

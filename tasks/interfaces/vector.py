@@ -16,6 +16,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.operating_system import HAS_WORKERS, cores
 from robots import SimulationError, TaskError, UnknownNameError, unknown_name_message
 from tasks.arrays import nested, row_of
 from tasks.engine.actions import ActionReader
@@ -419,7 +420,7 @@ def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 def _checked_workers(num_workers: int | None, num_envs: int) -> int:
     if num_workers is None:
-        return min(len(os.sched_getaffinity(0)), num_envs)
+        return min(cores(), num_envs) if HAS_WORKERS else 0
     if not (isinstance(num_workers, int) and 0 <= num_workers <= num_envs):
         raise TaskError(
             f"num_workers is {num_workers!r}; it must be an integer from 0 to the number of"

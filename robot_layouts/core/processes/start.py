@@ -28,6 +28,7 @@ from typing import Any, TypeAlias
 from weakref import WeakSet
 
 from robot_layouts.core.errors import RobotLayoutsError
+from robot_layouts.core.operating_system import HAS_WORKERS, after_fork
 
 SERVER_OF = "ROBOT_LAYOUTS_SERVER_OF"  # variable of the server: the process that it serves
 PRELOAD = "ROBOT_LAYOUTS_PRELOAD"  # likewise: the modules that it loads
@@ -62,6 +63,19 @@ class ProcessError(WorkerError):
 def preload(*modules: str) -> None:
     """Let the server load modules before it forks a worker; for those that workers will import."""
     _preloaded.update(dict.fromkeys(modules))
+
+
+def expect_workers() -> None:
+    """Refuse to begin where no worker can start.
+
+    Raises:
+        ProcessError: If the operating system is not Linux.
+    """
+    if not HAS_WORKERS:
+        raise ProcessError(
+            "worker processes need Linux; on this system use one process: workers=0, and"
+            " num_workers=0 of a vector"
+        )
 
 
 def start(work: Callable[..., None], *arguments: Any, with_main: bool = True) -> BaseProcess:
@@ -273,4 +287,4 @@ def _disown() -> None:
     os.close(null)
 
 
-os.register_at_fork(after_in_child=_disown)
+after_fork(_disown)

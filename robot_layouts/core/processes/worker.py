@@ -15,7 +15,13 @@ from enum import Enum, auto
 from multiprocessing.connection import wait
 from typing import Any
 
-from robot_layouts.core.processes.start import WorkerError, enough, exit_code, start
+from robot_layouts.core.processes.start import (
+    WorkerError,
+    enough,
+    exit_code,
+    expect_workers,
+    start,
+)
 from robot_layouts.core.processes.transport import SentError, described, loaded
 
 SHUTDOWN_SECONDS = 2.0  # that a worker may take to end by itself
@@ -240,7 +246,12 @@ class Pool:
     """Workers, and which of them has something to say."""
 
     def __init__(self) -> None:
-        """Begin without any."""
+        """Begin without any.
+
+        Raises:
+            ProcessError: If none can start on this operating system.
+        """
+        expect_workers()
         self.workers: list[Worker] = []
         self._poller = select.poll()
         self._owners: dict[int, Worker] = {}  # file descriptor → whose it is

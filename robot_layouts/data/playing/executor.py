@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import operator
-import os
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
@@ -11,6 +10,7 @@ from statistics import median
 from typing import Any, Protocol
 
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.operating_system import HAS_WORKERS, cores
 from robot_layouts.core.pages import plural
 from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import packed
@@ -81,7 +81,7 @@ class ProcessExecutor:
         """
         if workers is not None:
             checked_whole("workers", workers, 1, None, TaskError)
-        self.workers = len(os.sched_getaffinity(0)) if workers is None else workers
+        self.workers = cores() if workers is None else workers
         self._policy = RetryPolicy(attempts, fresh, episode_timeout)
 
     def run(self, prepare: Callable[[], Play], seeds: Iterable[int]) -> Generator[Event]:
@@ -125,7 +125,8 @@ def choose_executor(
     """Return who plays.
 
     Args:
-        workers: How many processes; 0: none, but this one; None: one for each core.
+        workers: How many processes; 0: none, but this one; None: one for each core,
+            and none where worker processes cannot start, as on macOS and Windows.
         executor: Who plays instead, as it was made.
         episode_timeout: See `ProcessExecutor`.
 
@@ -141,7 +142,7 @@ def choose_executor(
                 "an executor knows its own workers and episode_timeout; pass them where you make it"
             )
         return executor
-    if workers == 0:
+    if workers == 0 or (workers is None and not HAS_WORKERS):
         if limited and episode_timeout is not None:
             raise TaskError(
                 f"episode_timeout is {episode_timeout!r}, but with workers=0 this process plays,"

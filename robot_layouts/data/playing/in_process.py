@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import random
 from collections.abc import Callable, Generator, Iterable
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from robot_layouts.core.operating_system import after_fork
 from robot_layouts.core.processes.transport import as_ours
 from robot_layouts.data.playing.scheduler import Event, Play
 
@@ -95,7 +95,7 @@ def _begin_fork() -> None:
     _turn = RLock()
 
 
-os.register_at_fork(after_in_child=_begin_fork)
+after_fork(_begin_fork)
 
 
 def _settings() -> tuple[Any, ...]:

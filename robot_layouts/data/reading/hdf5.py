@@ -13,7 +13,6 @@ import math
 import os
 import posixpath
 import threading
-import time
 import zipfile
 import zlib
 from collections.abc import Callable, Collection, Generator, Iterator
@@ -27,6 +26,7 @@ import pyfive
 from numpy.typing import NDArray
 
 from robot_layouts.core.files import open_regular
+from robot_layouts.core.operating_system import read_at, resident_memory, thread_clock
 from robots import RobotLayoutsError
 
 MAX_BYTES = 2**30  # of one episode's arrays
@@ -219,7 +219,7 @@ class _Stream:
 
     def expect_end(self) -> None:
         """Refuse a file that is shorter than its first block says."""
-        start = os.pread(self._file.fileno(), 64, 0)
+        start = read_at(self._file, 64, 0)
         place = _END_PLACES.get(start[8]) if start.startswith(b"\x89HDF") else None
         if place is not None and int.from_bytes(start[place : place + 8], "little") > self.size:
             raise ContentError("its end is missing")
@@ -235,7 +235,7 @@ class _Stream:
         rest = max(0, self.size - self._position)
         self.reads += 1
         count = rest if size < 0 else min(size, rest)
-        found = os.pread(self._file.fileno(), count, self._position) if count else b""
+        found = read_at(self._file, count, self._position) if count else b""
         self._position += len(found)
         return found
 
@@ -253,12 +253,12 @@ def limited(seconds: float) -> Generator[None]:
         LimitError: If it does.
     """
     thread, done = threading.get_ident(), threading.Event()
-    clock = time.pthread_getcpuclockid(thread)
-    end, most = time.clock_gettime(clock) + seconds, _memory() + MEMORY
+    clock = thread_clock()
+    end, most = clock() + seconds, resident_memory() + MEMORY
 
     def watch() -> None:
         while not done.wait(_CHECK_EVERY):
-            if time.clock_gettime(clock) > end or _memory() > most:
+            if clock() > end or resident_memory() > most:
                 _interrupt(thread, LimitError)
 
     watcher = threading.Thread(target=watch, daemon=True)
@@ -272,12 +272,6 @@ def limited(seconds: float) -> Generator[None]:
 
 def _interrupt(thread: int, error: type[Exception]) -> None:
     ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(error))
-
-
-def _memory() -> int:
-    """Return how many bytes this process has in memory."""
-    with open("/proc/self/statm") as file:
-        return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
 
 
 def _member(group: Any, name: str) -> Any:

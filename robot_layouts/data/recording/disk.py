@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Generator
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -10,6 +9,7 @@ from io import FileIO
 from pathlib import Path
 from typing import Any
 
+from robot_layouts.core.operating_system import lock, open_folder
 from robot_layouts.core.writing import writing_errors
 from robots import RecordingError
 
@@ -24,7 +24,7 @@ def claim(folder: Path, *, certain: bool = False) -> int | None:
 
     Args:
         folder: The folder.
-        certain: Whether to return None where the file system has no locks.
+        certain: Whether to return None where the file or the operating system has no locks.
 
     Returns:
         An open descriptor that holds the lock until it is closed, which the death of the process
@@ -34,13 +34,15 @@ def claim(folder: Path, *, certain: bool = False) -> int | None:
         with suppress(FileExistsError):
             folder.mkdir()
         try:
-            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+            descriptor = open_folder(folder)
         except FileNotFoundError:  # the process that held the lock has just removed the folder
             if folder.is_symlink():
                 raise
             continue
+        if descriptor is None:  # this system locks no folders
+            return None if certain else os.open(os.devnull, os.O_RDONLY)
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(descriptor)
         except BlockingIOError:
             os.close(descriptor)
             return None

@@ -70,7 +70,7 @@ def import_ompl() -> tuple[Any, Any, Any]:
         from ompl import base, geometric, util
     except ImportError as error:
         raise MissingPackageError(
-            "planning needs OMPL, which has wheels for Python 3.10 to 3.13:"
+            "planning needs OMPL, which has wheels for Python 3.10 to 3.13 on Linux and macOS:"
             " pip install 'robot-layouts[motion]'"
         ) from error
     util.setLogLevel(util.LogLevel.LOG_NONE)

@@ -17,6 +17,7 @@ from robot_layouts.core.bounds import checked_number, shown
 from robot_layouts.core.errors import MissingPackageError, MotionError
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.timing.paths import Path
+from robot_layouts.motion.timing.sweeps import fastest_speeds
 from robots import RobotDescriptor
 from robots.action_split import JointGroup
 from robots.urdf.reading import read_model
@@ -111,7 +112,8 @@ def largest_accelerations(
 def timed(path: Path, accelerations: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the fastest way along a path: times, positions and velocities of dense knots.
 
-    It begins and ends at rest, and rests at points without a blend.
+    It begins and ends at rest, and rests at points without a blend. Speeds are toppra's, or where
+    that is not installed, those of `robot_layouts.motion.timing.sweeps`.
 
     Args:
         path: With the largest speeds.
@@ -120,8 +122,6 @@ def timed(path: Path, accelerations: Floats) -> tuple[Floats, Floats, Floats]:
     Returns:
         Times from 0, 0.02 s apart, (T,) (s); positions (T, coordinates) and velocities.
 
-    Raises:
-        MissingPackageError: If toppra is not installed.
     """
     if len(path.points) < 2:  # already there
         still = np.repeat(path.points, 2, axis=0)
@@ -140,7 +140,10 @@ def timed(path: Path, accelerations: Floats) -> tuple[Floats, Floats, Floats]:
 
 def _profile(run: Path, accelerations: Floats) -> tuple[Floats, Floats]:
     """Return parameters along a path without stops, and the speed at each."""
-    import_toppra()
+    try:
+        import_toppra()
+    except MissingPackageError:
+        return _swept(run, accelerations)
     from toppra.algorithm import TOPPRA
     from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
 
@@ -158,6 +161,18 @@ def _profile(run: Path, accelerations: Floats) -> tuple[Floats, Floats]:
         speed = found[1]
         if speed is not None and np.isfinite(speed).all() and (speed[1:-1] > 0).all():
             return grid, np.asarray(speed, float)
+    return _stopping(run, accelerations)
+
+
+def _swept(run: Path, accelerations: Floats) -> tuple[Floats, Floats]:
+    """Return the profile where toppra is not installed."""
+    for refined in (1, 2, 4):
+        grid = run.grid(10 * refined, 0.05 / refined)
+        speed = fastest_speeds(
+            grid, run.at(grid, 1), run.at(grid, 2), _MARGIN * run.speeds, _MARGIN * accelerations
+        )
+        if (speed[1:-1] > 0).all():
+            return grid, speed
     return _stopping(run, accelerations)
 
 

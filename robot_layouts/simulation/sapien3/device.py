@@ -12,6 +12,7 @@ from functools import cache
 from typing import Any, NamedTuple
 from weakref import WeakSet
 
+from robot_layouts.core.operating_system import after_fork
 from robots import SimulationError
 
 # What Mesa's software driver goes by: bits that it computes at once, threads, instructions.
@@ -55,7 +56,7 @@ def _keep_worlds() -> None:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(world))  # not even when Python ends
 
 
-os.register_at_fork(after_in_child=_keep_worlds)
+after_fork(_keep_worlds)
 
 
 # -- what draws ----------------------------------------------------------------------------------
