@@ -10,7 +10,16 @@ import pytest
 from tests.clients.environments import ROOT, new_environment, play
 
 HERE = Path(__file__).parent
-CLIENTS = ("cleanrl", "minari", "rllib", "skrl", "supersuit", "tianshou", "torchrl")
+CLIENTS = (
+    "cleanrl",
+    "inspect_robots",
+    "minari",
+    "rllib",
+    "skrl",
+    "supersuit",
+    "tianshou",
+    "torchrl",
+)
 LARGE = {  # that bring gigabytes of CUDA, and are not installed for a test
     "robomimic": "robomimic needs torchvision, which fits no CPU build of torch from the index",
 }
