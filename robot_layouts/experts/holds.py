@@ -10,7 +10,7 @@ import numpy as np
 from objects import Grasp, ObjectDescriptor
 from robot_layouts.experts.hands import Hand
 from robot_layouts.experts.script import Pose, Scene
-from robot_layouts.kinematics.rotations import Floats, pose_matrix
+from robot_layouts.kinematics.rotations import Floats, pose_matrix, rotation_about
 from robot_layouts.simulation.world import part_name
 from robots import TaskError
 
@@ -31,6 +31,7 @@ class Hold:
         own: Pose of the gripper's frame, between its pads, in that body's, (4, 4) (m).
         pads: Pose of the gripper's frame in its TCP link's as it comes, (4, 4) (m).
         shut: The same once it holds the thing: where one jaw moves alone, elsewhere.
+        share: How far the gripper is open as it comes, from 0 to 1.
     """
 
     grasp: Grasp
@@ -39,15 +40,28 @@ class Hold:
     own: Floats
     pads: Floats
     shut: Floats
+    share: float
 
     def at(self, scene: Scene) -> Floats:
         """Return where the gripper's frame is with the body where it is now, (4, 4) (m)."""
         return self.on(scene, scene.body(self.body))
 
-    def from_behind(self) -> Hold:
-        """Return it with the gripper coming from the other side, its fingers where they were."""
+    def pitched(self, angle: float) -> Hold:
+        """Return it with the gripper turned about the way its fingers part by an angle (rad)."""
         own = self.own.copy()
-        own[:3, [0, 2]] *= -1.0
+        own[:3, :3] @= rotation_about((0.0, 1.0, 0.0), np.array(angle))
+        return replace(self, own=own)
+
+    def opened(self, hand: Hand, ajar: float) -> Hold:
+        """Return it with the gripper open so far that each pad is that far from the thing (m)."""
+        wide = self.grasp.opening + 2 * ajar
+        pads = hand.opened_from(self.shut, self.grasp.opening, wide)
+        return replace(self, pads=pads, share=hand.motion.share(wide))
+
+    def aside(self, distance: float) -> Hold:
+        """Return it with the gripper moved along its x axis, along what it holds (m)."""
+        own = self.own.copy()
+        own[:3, 3] += distance * own[:3, 0]
         return replace(self, own=own)
 
     def drawn_back(self, distance: float) -> Hold:
@@ -69,7 +83,6 @@ class Holds:
 
     Attributes:
         each: The grasps.
-        share: How far the gripper is open before it closes, from 0 to 1.
         closing: The force with which it closes until it feels the thing (N).
         holding: The force with which it holds it (N).
         pressing: The force on each finger from which on the thing may be moved (N): drives that are
@@ -78,7 +91,6 @@ class Holds:
     """
 
     each: tuple[Hold, ...]
-    share: float
     closing: float
     holding: float
     pressing: float
@@ -125,33 +137,33 @@ def holds_of(hand: Hand, body: str, thing: ObjectDescriptor, parts: Sequence[str
             f"the gripper of {hand.arm!r} takes what is less than {1e3 * (widest - AJAR):.0f} mm"
             f" wide; {thing.name} is {1e3 * narrow:.0f} mm wide where it is grasped"
         )
-    moving = {joint.name for joint in thing.joints}
     shut = {grasp.opening: hand.shut(grasp.opening) for grasp in grasps}
-    each = tuple(
-        Hold(
-            grasp,
-            body,
-            part_name(body, grasp.part) if grasp.part in moving else body,
-            pose_matrix(grasp.position, grasp.quaternion),
-            hand.opened_from(frame, grasp.opening, grasp.opening + 2 * AJAR),
-            frame,
-        )
-        for grasp in grasps
-        if (frame := shut[grasp.opening]) is not None
-    )
-    if not each:
+    closing = {opening: frame for opening, frame in shut.items() if frame is not None}
+    if not closing:
         tried = ", ".join(f"{1e3 * opening:.0f}" for opening in sorted(shut))
         raise TaskError(
             f"the gripper of {hand.arm!r} closes on cubes of {tried} mm, as wide as {thing.name} is"
             " where it is grasped, without holding them; robot-layouts robots inspect ROBOT --try"
             " says how it grasps"
         )
-    wide = max(hold.grasp.opening for hold in each)
+    moving, wide = {joint.name for joint in thing.joints}, max(closing)
+    each = tuple(
+        Hold(
+            grasp,
+            body,
+            part_name(body, grasp.part) if grasp.part in moving else body,
+            pose_matrix(grasp.position, grasp.quaternion),
+            hand.opened_from(closing[grasp.opening], grasp.opening, grasp.opening + 2 * AJAR),
+            closing[grasp.opening],
+            hand.motion.share(wide + 2 * AJAR),
+        )
+        for grasp in grasps
+        if grasp.opening in closing
+    )
     carried = thing.mass if any(hold.body == body for hold in each) else 0.0
     force = FIRM + FIRM_PER_MASS * carried
     return Holds(
         each,
-        hand.motion.share(wide + 2 * AJAR),
         hand.closing(wide),
         hand.holding(force, wide),
         min(PRESSING * force, ENOUGH),

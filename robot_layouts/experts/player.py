@@ -180,9 +180,8 @@ class Player:
             self._goal = next(free, goals[0])
         self._current = waypoint
         if waypoint.gripper is not None:
-            self._gripper, self._share, self._squeeze = (
-                waypoint.gripper, waypoint.share, waypoint.squeeze
-            )  # fmt: skip
+            share = waypoint.share(scene) if callable(waypoint.share) else waypoint.share
+            self._gripper, self._share, self._squeeze = waypoint.gripper, share, waypoint.squeeze
         self._begun, self._elapsed = self._begun + 1, 0
         self._nearest_yet, self._waited = np.inf, 0
 

@@ -34,6 +34,9 @@ class Way:
             that is no condition.
         cost: What it is worth to have another way instead (rad of way).
         enter: Number of the pose to which the arm goes first.
+        share: How far the gripper is open meanwhile, from 0 to 1; None is as now.
+        moved: For each of the poses, where bodies are then that are elsewhere now; without any, all
+            are where they are.
     """
 
     frame: Floats
@@ -41,6 +44,12 @@ class Way:
     then: Sequence[Sequence[Floats]] = ()
     cost: float = 0.0
     enter: int = 0
+    share: float | None = None
+    moved: Sequence[Mapping[str, Pose]] = ()
+
+    def begun(self, hand: Hand, start: Floats) -> Floats:
+        """Return a posture with the gripper as open as it is on this way, (dof,) (rad, m)."""
+        return start if self.share is None else hand.opened(start, self.share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +74,6 @@ def routes(
     ways: Sequence[Way],
     *,
     what: str,
-    start: Floats | None = None,
     touched: Collection[str] = (),
     carried: str | None = None,
     besides: Collection[str] = (),
@@ -80,9 +88,8 @@ def routes(
         scene: As it is now.
         ways: The ways.
         what: What it is to do, for the reason: "to take the mug".
-        start: Posture from which it begins, (dof,) (rad, m); None is the present one.
         touched: Bodies that its fingers may touch.
-        carried: A body that goes with it and is not looked at.
+        carried: A body that goes with it, and is looked at only where `Way.moved` says where it is.
         besides: Robots that are not looked at.
         count: How many ways are enough.
         loose: See `Hand.reach`.
@@ -90,7 +97,7 @@ def routes(
     Raises:
         StuckError: If there is no such way; says why.
     """
-    start = hand.qpos(scene) if start is None else start
+    start = hand.qpos(scene)
     reached = sorted(_begun(hand, ways, start, loose=loose), key=lambda route: route.cost)
     if not reached:
         raise StuckError(f"{hand.arm!r} cannot reach far enough {what}, in any of {len(ways)} ways")
@@ -99,15 +106,18 @@ def routes(
         for route in reached[:FOLLOWED]
         if (whole := _followed(hand, ways[route.number], route, loose=loose)) is not None
     )
-    look = Look(task, scene, touched, {hand.owner: start}, carried, besides)
+    look = Look(task, scene, touched, {hand.owner: ways[0].begun(hand, start)}, carried, besides)
     free, swept, worst, any_followed = list[Route](), list[Route](), None, False
     for _, route in zip(range(CHECKED), followed, strict=False):
         any_followed = True
-        ends = (*route.postures[:2], *route.postures[2:][-1:])
-        overlap = look.overlap({hand.owner: end} for end in ends)
+        way = ways[route.number]
+        moved = way.moved or [NOTHING] * len(route.postures)
+        ends = [*zip(route.postures, moved, strict=True)]
+        found = (look.overlap([{hand.owner: q}], there) for q, there in ends[:2] + ends[2:][-1:])
+        overlap = max(filter(None, found), key=lambda one: one.depth, default=None)
         if overlap is None:
-            entry = route.postures[ways[route.number].enter]
-            passed = ({hand.owner: start + share * (entry - start)} for share in PASSED)
+            entry, begun = route.postures[way.enter], way.begun(hand, start)
+            passed = ({hand.owner: begun + share * (entry - begun)} for share in PASSED)
             (free if look.overlap(passed) is None else swept).append(route)
             if len(free) == count:
                 break
@@ -123,9 +133,9 @@ def routes(
 def _begun(hand: Hand, ways: Sequence[Way], start: Floats, *, loose: bool) -> Iterator[Route]:
     """Yield the ways whose first pose is in reach."""
     for numbers in _alike(ways):
-        frame = ways[numbers[0]].frame
+        frame, begun = ways[numbers[0]].frame, ways[numbers[0]].begun(hand, start)
         poses = np.array([ways[number].poses[0] for number in numbers])
-        found = hand.reach(poses[:, :3, 3], poses[:, :3, :3], frame, start[None], loose=loose)
+        found = hand.reach(poses[:, :3, 3], poses[:, :3, :3], frame, begun[None], loose=loose)
         for which, qpos, off in zip(found.which, found.qpos, found.off, strict=True):
             number = numbers[which]
             cost = float(hand.way(qpos, start)) + OFF * float(off) + ways[number].cost
@@ -133,10 +143,10 @@ def _begun(hand: Hand, ways: Sequence[Way], start: Floats, *, loose: bool) -> It
 
 
 def _alike(ways: Sequence[Way]) -> Iterable[list[int]]:
-    """Return the numbers of the ways, those of the same frame together."""
-    alike: dict[bytes, list[int]] = {}
+    """Return the numbers of the ways, those of the same frame and gripper together."""
+    alike: dict[tuple[bytes, float | None], list[int]] = {}
     for number, way in enumerate(ways):
-        alike.setdefault(np.round(way.frame, 9).tobytes(), []).append(number)
+        alike.setdefault((np.round(way.frame, 9).tobytes(), way.share), []).append(number)
     return alike.values()
 
 
@@ -227,10 +237,10 @@ class Look:
             if name not in self._touched
             for position, quaternion in (scene.body(name),)
         }
-        if carried is not None:
-            self._nearer[carried] = AWAY
         found = self._room.overlaps(scene, start, self._nearer)
         self._usual = {frozenset(overlap[:2]) for overlap in found}
+        if carried is not None:
+            self._nearer[carried] = AWAY
 
     def overlap(
         self, postures: Iterable[Mapping[str, Floats]], moved: Mapping[str, Pose] = NOTHING

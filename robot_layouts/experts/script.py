@@ -93,6 +93,10 @@ class Scene:
         return float(min(np.linalg.norm(force) for force in forces))
 
 
+Share = float | Callable[[Scene], float]
+"""How far a gripper is open, from 0 to 1, or what works that out from the scene."""
+
+
 @dataclass(frozen=True)
 class Waypoint:
     """One thing that one robot does.
@@ -115,7 +119,8 @@ class Waypoint:
             of too few joints to choose that too.
         joints: Instead of ``to``, postures of the arm, each (arm joints,) (rad), worked out from
             the scene when the waypoint begins; the one with the shortest way there is taken.
-        share: Instead of ``gripper``, how far the gripper is open meanwhile, from 0 to 1; see
+        share: Instead of ``gripper``, how far the gripper is open meanwhile, from 0 to 1, worked
+            out when the waypoint begins if it is a function of the scene; see
             `robots.gripper_motion.GripperMotion`.
         squeeze: Instead of both, the force with which its fingers close meanwhile (N).
     """
@@ -131,7 +136,7 @@ class Waypoint:
     most: int | None = None
     at: Callable[[Scene], Floats] | None = None
     joints: Callable[[Scene], Sequence[Floats]] | None = None
-    share: float | None = None
+    share: Share | None = None
     squeeze: float | None = None
 
 

@@ -19,8 +19,9 @@ from robot_layouts.experts.geometry import turn
 from robot_layouts.experts.hands import Hand
 from robot_layouts.experts.holds import SPLAYED, Hold, Holds, holds_of
 from robot_layouts.experts.player import StuckError
+from robot_layouts.experts.room import NOTHING
 from robot_layouts.experts.routes import Way, routes
-from robot_layouts.experts.script import Pose, Scene, Waypoint
+from robot_layouts.experts.script import Pose, Scene, Share, Waypoint
 from robot_layouts.kinematics.rotations import (
     Floats,
     multiply,
@@ -149,13 +150,13 @@ def grasp(
             return ways(scene)
         return [] if goals is None else [[pose] for pose in goals(scene)]
 
-    def choose(scene: Scene) -> list[tuple[Hold, Floats]]:
+    def choose(scene: Scene) -> tuple[Hold, Floats]:
         steep = [hold for hold in holds.each if _leaning(hold.at(scene)) <= lean + 1e-6]
         if not steep:
             raise StuckError(
                 f"{robot!r} would lean more than {lean:.2g} rad in all grasps of {body}"
             )
-        return taken(task, hand, scene, holds, steep, back=back, up=up, then=then)
+        return taken(task, hand, scene, holds, steep, back=back, up=up, then=then)[0]
 
     return taking(hand, body, holds, choose, back, after)
 
@@ -173,7 +174,7 @@ def taken(
     count: int = 1,
     besides: Collection[str] = (),
 ) -> list[tuple[Hold, Floats]]:
-    """Return grasps that an arm can do, the best first, each with the posture at it; see `grasp`.
+    """Return grasps that an arm can do, the best first; see `grasp`.
 
     Fingers whose tips would be inside of what a thing lies on take it a little higher.
 
@@ -189,8 +190,10 @@ def taken(
             raised = [shifted(at, up * UP)] if up else []
             onward = [[hold.on(scene, pose) for pose in way] for way in then(scene, hold)]
             poses = (at, shifted(at, -back * at[:3, 2]), *raised)
+            place, turned = scene.body(hold.body)
+            moved = [NOTHING, NOTHING, {hold.body: (place + up * UP, turned)}][: len(poses)]
             cost = LEANING * float(1 + at[2, 2]) + LEVER * holds.lever(hold)
-            ways.append(Way(hold.pads, poses, onward, cost, enter=1))
+            ways.append(Way(hold.pads, poses, onward, cost, 1, hold.share, moved))
         try:
             found = routes(
                 task,
@@ -198,7 +201,6 @@ def taken(
                 scene,
                 ways,
                 what=f"to take {some[0].thing}",
-                start=hand.opened(hand.qpos(scene), holds.share),
                 touched={*holds.bodies},
                 besides=besides,
                 count=count,
@@ -215,7 +217,7 @@ def taking(
     hand: Hand,
     body: str,
     holds: Holds,
-    choose: Callable[[Scene], list[tuple[Hold, Floats]]],
+    choose: Callable[[Scene], tuple[Hold, Floats]],
     back: float = BACK,
     after: tuple[str, ...] = (),
 ) -> tuple[Waypoint, ...]:
@@ -225,35 +227,34 @@ def taking(
         hand: The arm.
         body: The thing's name in the world.
         holds: Its grasps.
-        choose: Given the scene, those to choose from when they begin, each with a posture of the
-            robot near that with which it is done, (dof,) (rad, m).
+        choose: Given the scene, that which is taken, and a posture of the robot near that with
+            which it is done, (dof,) (rad, m).
         back: See `grasp`.
         after: See `Waypoint`.
     """
     chosen: list[tuple[Hold, Floats]] = []
 
     def before(scene: Scene) -> list[Floats]:
-        chosen[:] = choose(scene)
-        return [joints for hold, posture in chosen for joints in at(scene, hold, posture, back)]
+        chosen[:] = [choose(scene)]
+        return at(scene, back)
 
     def around(scene: Scene) -> list[Floats]:
-        return [joints for hold, posture in chosen for joints in at(scene, hold, posture, 0.0)]
+        return at(scene, 0.0)
+
+    def at(scene: Scene, back: float) -> list[Floats]:
+        ((hold, _),) = chosen
+        pose = hold.at(scene)
+        return near(scene, hold.pads, shifted(pose, -back * pose[:3, 2]))
 
     def shut(scene: Scene) -> list[Floats]:
-        return [
-            joints
-            for hold, posture in chosen
-            for joints in near(scene, hold.shut, hold.at(scene), posture)
-        ]
+        ((hold, _),) = chosen
+        return near(scene, hold.shut, hold.at(scene))
 
-    def at(scene: Scene, hold: Hold, posture: Floats, back: float) -> list[Floats]:
-        pose = hold.at(scene)
-        return near(scene, hold.pads, shifted(pose, -back * pose[:3, 2]), posture)
+    def near(scene: Scene, frame: Floats, pose: Floats) -> list[Floats]:
+        return nearest_posture(hand, frame, pose, hand.like(scene, chosen[0][1]))
 
-    def near(scene: Scene, frame: Floats, pose: Floats, posture: Floats) -> list[Floats]:
-        start = hand.like(scene, posture)
-        exact = near_posture(hand, frame, pose, start)
-        return exact or near_posture(hand, frame, pose, start, loose=True)
+    def share(scene: Scene) -> float:
+        return chosen[0][0].share
 
     def held(scene: Scene) -> bool:
         return any(scene.grasps(hand.arm, each) for each in holds.bodies)
@@ -266,11 +267,11 @@ def taking(
         Waypoint(
             f"above {body}",
             joints=before,
-            share=holds.share,
+            share=share,
             near=READY / hand.length,
             after=after,
         ),
-        Waypoint(f"around {body}", joints=around, share=holds.share, near=NEAR / hand.length),
+        Waypoint(f"around {body}", joints=around, share=share, near=NEAR / hand.length),
         Waypoint(
             f"grasp {body}",
             joints=shut,
@@ -315,9 +316,14 @@ def carry(
 
     def choose(scene: Scene) -> None:
         frame = hand.held(scene, body)
-        offered = [Way(frame, [pose_matrix(*pose) for pose in way]) for way in ways(scene)]
+        offered = [
+            Way(frame, [pose_matrix(*pose) for pose in way], moved=[{body: pose} for pose in way])
+            for way in ways(scene)
+        ]
         what = f"to {names[-1]}"
-        (best,) = routes(task, hand, scene, offered, what=what, carried=body, loose=loose)
+        (best,) = routes(
+            task, hand, scene, offered, what=what, touched=[body], carried=body, loose=loose
+        )
         chosen[:] = [*zip(offered[best.number].poses, best.postures, strict=True)]
 
     def joints(scene: Scene, number: int) -> list[Floats]:
@@ -325,8 +331,7 @@ def carry(
             choose(scene)
         pose, posture = chosen[number]
         frame, start = hand.held(scene, body), hand.like(scene, posture)
-        exact = near_posture(hand, frame, pose, start, loose=loose)
-        return exact or near_posture(hand, frame, pose, start, loose=True)
+        return nearest_posture(hand, frame, pose, start, loose=loose)
 
     return tuple(
         Waypoint(
@@ -431,7 +436,7 @@ def release(
     body: str,
     *,
     away: float = 2 * BACK,
-    share: float | None = None,
+    share: Share | None = None,
     after: tuple[str, ...] = (),
 ) -> tuple[Waypoint, ...]:
     """Return the waypoints that let go of what an arm holds and draw back: release, leave.
@@ -661,7 +666,7 @@ def press(
         return at @ pose_matrix((0.0, 0.0, away), multiply(turn("x", pi), turn("z", turned)))
 
     def choose(scene: Scene) -> None:
-        now, shut = scene.joints(body)[joint], hand.opened(hand.qpos(scene), 0.0)
+        now = scene.joints(body)[joint]
         ways = [
             Way(
                 frame,
@@ -671,11 +676,12 @@ def press(
                 ],
                 [[gripper(scene, to, yaw, -DEEPER)]],
                 enter=1,
+                share=0.0,
             )
             for yaw in YAWS
         ]
         what = f"to press {part}"
-        (best,) = routes(task, hand, scene, ways, what=what, start=shut, touched={part, body})
+        (best,) = routes(task, hand, scene, ways, what=what, touched={part, body})
         way = ways[best.number]
         chosen[:] = [(way.poses[1], best.postures[1]), (way.then[0][0], best.postures[0])]
 
@@ -717,6 +723,14 @@ def near_posture(
         pose[None, :3, 3], pose[None, :3, :3], frame, start[None], scatter=False, loose=loose
     )
     return list(hand.joints(found.qpos))
+
+
+def nearest_posture(
+    hand: Hand, frame: Floats, pose: Floats, start: Floats, *, loose: bool = False
+) -> list[Floats]:
+    """Return what `near_posture` does; turned otherwise by up to 0.35 rad if there is no other."""
+    exact = near_posture(hand, frame, pose, start, loose=loose)
+    return exact or near_posture(hand, frame, pose, start, loose=True)
 
 
 def _leaning(gripper: Floats) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice, product
+from itertools import combinations, islice, product
 from math import ceil, pi, radians
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy as np
 from objects import ObjectDescriptor
 from robot_layouts.experts.geometry import gripper_facing, heading
 from robot_layouts.experts.hands import Hand
-from robot_layouts.experts.holds import Hold, Holds, holds_of
+from robot_layouts.experts.holds import AJAR, Hold, Holds, holds_of
 from robot_layouts.experts.player import StuckError
 from robot_layouts.experts.room import room_of
 from robot_layouts.experts.routes import PRESSED, Look
@@ -21,12 +21,15 @@ from robot_layouts.experts.script import Pose, Scene, Waypoint
 from robot_layouts.experts.skills import (
     BACK,
     DRAWN,
+    LEANING,
     LEG,
+    LEVER,
     NEAR,
     PASSING,
     UP,
     lift,
     near_posture,
+    nearest_posture,
     release,
     shifted,
     taken,
@@ -40,7 +43,7 @@ from robot_layouts.kinematics.rotations import (
     rotation_about,
     rotation_of,
 )
-from robot_layouts.simulation.backend import Overlap
+from robot_layouts.simulation.checks.overlaps import between_robots
 from tasks import TaskEnv
 
 REFERENCE = 0.855  # m; reach of a Panda, for which the next lengths hold
@@ -49,9 +52,20 @@ LEANS = tuple(map(radians, (20, 50, 80, 100)))  # of the giver when it gives, fr
 HEADINGS = tuple(map(radians, (0, 45, -45)))  # of the giver then, from the way to the taker
 BESIDE = 0.08  # m between hands that lift a thing together
 APART, OPPOSED = 0.02, 0.4  # m between hands, or cosine between their approaches at most
-OFFERED, PICKS, GIVES, TAKES, MEETINGS, EACH = 12, 4, 16, 500, 60, 6  # of each that go on
+WIDER = 0.024  # m between each pad and a thing, for hands that hold it crosswise
+BACKWARD = -0.3  # cosine between the taker's approach and its way to the thing, at least
+PITCHES = (0.0, pi, *(k * pi / 4 for k in (1, -1, 2, -2, 3, -3)))  # rad; sides to take from
+# How the giver's hand is pitched (rad), and the taker's moved along the thing (m), in this order.
+MANNERS = (
+    ((0.0,), (0.0,)),
+    ((pi / 4, -pi / 4), (0.0,)),
+    ((0.0, pi / 4, -pi / 4), (0.012, -0.012)),
+)
+TIGHT, DEEPEST = 1.5e-3, 5e-3  # m; by which fingers are closed too far, and so deep at most then
+PICKS, GIVES, TAKES, MEETINGS, EACH = 4, 16, 960, 120, 6  # of each that go on
 OFF = 4.0  # rad of way that a gripper is worth which is turned as it should be, by 1 rad
-CLOSER, TOUCHING = 0.006, 1e-3  # m that a hand may come nearer to the other than it should
+CLOSER = 0.006  # m that a hand may come nearer to the other than it should
+PALM, TOUCHING = 0.1, 1e-3  # m from fingers to palm; between places that count as one
 FACING = 1.5  # rad of way that it is worth when two hands come from opposite sides
 ROOMY, WIDE = 5.0, 0.2  # rad of way that 1 m between two hands is worth; m up to which it is
 PLACES = 0.04  # m; apart, grasps differ
@@ -89,20 +103,19 @@ def lift_together(
     hands = {robot: Hand(task, robot) for robot in robots}
     holds = {robot: holds_of(hand, body, thing, parts) for robot, hand in hands.items()}
     count = max(2, ceil(by / LEG))
-    planned: dict[str, list[tuple[Hold, Floats]]] = {}
+    planned: dict[str, tuple[Hold, Floats]] = {}
     began: list[Pose] = []
 
-    def choose(scene: Scene, robot: str) -> list[tuple[Hold, Floats]]:
+    def choose(scene: Scene, robot: str) -> tuple[Hold, Floats]:
         if robot not in planned:
             began[:] = [scene.body(body)]
             planned.update(_sides(task, hands, holds, scene, by, lean))
-        return [*planned.pop(robot)]
+        return planned.pop(robot)
 
     def raised(scene: Scene, robot: str, number: int) -> list[Floats]:
         hand, (place, quaternion) = hands[robot], began[0]
         pose = pose_matrix(place + by * (number + 1) / count * UP, quaternion)
-        frame = hand.held(scene, body)
-        return near_posture(hand, frame, pose, hand.qpos(scene), loose=True)
+        return nearest_posture(hand, hand.held(scene, body), pose, hand.qpos(scene))
 
     script: dict[str, tuple[Waypoint, ...]] = {}
     for robot, hand in hands.items():
@@ -131,7 +144,7 @@ def _sides(
     scene: Scene,
     by: float,
     lean: float,
-) -> dict[str, list[tuple[Hold, Floats]]]:
+) -> dict[str, tuple[Hold, Floats]]:
     """Return a grasp for each arm, on its own side of the thing, so that no hands overlap.
 
     Raises:
@@ -152,25 +165,40 @@ def _sides(
         for robot, hand in hands.items()
     }
     room = room_of(task, scene)
-    for chosen in product(*offered.values()):
-        places = [hold.at(scene)[:3, 3] for hold, _ in chosen]
-        gaps = [np.linalg.norm(one - other) for i, one in enumerate(places) for other in places[:i]]
-        if min(gaps) < BESIDE:
-            continue
-        postures = {
-            hand.owner: posture for hand, (_, posture) in zip(hands.values(), chosen, strict=True)
+    for off in (CLOSER, 0.0):
+        nearer = {
+            robot: [
+                (hold, posture, _moved(hands[robot], hold, scene, posture, middle, off))
+                for hold, posture in some
+            ]
+            for robot, some in offered.items()
         }
-        between = [
-            overlap
-            for overlap in room.overlaps(scene, postures)
-            if overlap.one.robot
-            and overlap.other.robot
-            and overlap.one.robot != overlap.other.robot
-        ]
-        if not between:
-            return {robot: [each] for robot, each in zip(hands, chosen, strict=True)}
+        for chosen in product(*nearer.values()):
+            places = [hold.at(scene)[:3, 3] for hold, _, _ in chosen]
+            pairs = combinations(places, 2)
+            if min(float(np.linalg.norm(one - other)) for one, other in pairs) < BESIDE:
+                continue
+            postures = {
+                hand.owner: moved
+                for hand, (_, _, moved) in zip(hands.values(), chosen, strict=True)
+            }
+            if not between_robots(room.overlaps(scene, postures)):
+                return {robot: each[:2] for robot, each in zip(hands, chosen, strict=True)}
     names = " and ".join(map(repr, hands))
     raise StuckError(f"{names} cannot take {next(iter(holds.values())).each[0].thing} at once")
+
+
+def _moved(
+    hand: Hand, hold: Hold, scene: Scene, posture: Floats, middle: Floats, off: float
+) -> Floats:
+    """Return a posture of an arm with its hand nearer to the middle of all (m), if it can be."""
+    pose = hold.at(scene)
+    way = (middle - pose[:3, 3]) * (1.0, 1.0, 0.0)
+    way *= off / max(float(np.linalg.norm(way)), TOUCHING)
+    joints = near_posture(hand, hold.pads, shifted(pose, way), posture)
+    moved = posture.copy()
+    moved[hand.columns] = joints[0] if joints else posture[hand.columns]
+    return moved
 
 
 def _from_side(
@@ -268,11 +296,13 @@ class _Rendezvous:
         give: The giver's posture, (dof,) (rad, m).
         body: Pose of the thing, (4, 4) (m).
         grip: Of the giver's gripper in its TCP link's frame, (4, 4) (m).
+        released: How far the giver's gripper opens when it lets go, from 0 to 1.
     """
 
     give: Floats
     body: Floats
     grip: Floats
+    released: float
 
 
 class _Passing:
@@ -289,10 +319,12 @@ class _Passing:
     ) -> None:
         self._task, self.giver, self.taker, self._body = task, giver, taker, body
         self._givers, self.takers = (holds_of(hand, body, thing) for hand in (giver, taker))
-        self.released = self._givers.share
         self._lean, self._scale = lean, min(giver.length, taker.length) / REFERENCE
         self._meeting: _Rendezvous | None = None
         self._takes: list[Hold] | None = None
+        fingers = task.layout.arm(taker.arm).robot.fingers
+        assert fingers is not None  # or `Hand` had said so
+        self._fingers = fingers.links
 
     def picking(self) -> tuple[Waypoint, ...]:
         """Return the giver's waypoints until it has lifted the thing."""
@@ -302,31 +334,52 @@ class _Passing:
             *lift(self._task, self.giver.arm, self._body, by),
         )
 
-    def _pick(self, scene: Scene) -> list[tuple[Hold, Floats]]:
+    def released(self, scene: Scene) -> float:
+        """Return how far the giver opens when it lets go."""
+        assert self._meeting is not None
+        return self._meeting.released
+
+    def _pick(self, scene: Scene) -> tuple[Hold, Floats]:
         """Return the grasp with which the giver takes the thing so that it can give it.
 
         Raises:
             StuckError: If there is none; says why.
         """
-        hand = self.giver
-        some = [h for h in self._givers.each if -h.at(scene)[2, 2] >= np.cos(self._lean) - 1e-6]
-        by = LIFT * self._scale
-        offered = taken(
-            self._task, hand, scene, self._givers, some, back=BACK, up=by, count=OFFERED
-        )
-        unlike = {_alike(hold): (hold, posture) for hold, posture in reversed(offered)}
-        found = [*unlike.values()][::-1][:PICKS]
-        reason: StuckError | None = None
-        for hold, posture in found:
-            in_hand = hold.shut @ inverse_pose(hold.own)
-            try:
-                self._meeting = self._meet(scene, posture, in_hand, hold)
-            except StuckError as error:
-                reason = reason or error
-            else:
-                return [(hold, posture)]
-        assert reason is not None
-        raise reason
+        reasons = [StuckError(f"no grasp of {self._body} is left for {self.taker.arm!r}")]
+        for pitches, asides in MANNERS:
+            self._takes = self._free_takes(scene, asides)
+            for alike in self._gives(scene, pitches)[:PICKS]:
+                try:
+                    hold, posture = self._taken(scene, alike)
+                    in_hand = hold.shut @ inverse_pose(hold.own)
+                    self._meeting = self._meet(scene, posture, in_hand, hold)
+                except StuckError as error:
+                    reasons.append(error)
+                else:
+                    return hold, posture
+        raise reasons[:2][-1]
+
+    def _taken(self, scene: Scene, some: Sequence[Hold]) -> tuple[Hold, Floats]:
+        """Return the best of some grasps of the giver; see `taken`."""
+        up = LIFT * self._scale
+        return taken(self._task, self.giver, scene, self._givers, some, back=BACK, up=up)[0]
+
+    def _gives(self, scene: Scene, pitches: Sequence[float]) -> list[list[Hold]]:
+        """Return the giver's grasps that leave one to the taker, alike ones together; best first.
+
+        Those come first that are steep, near the centre of mass, and far from what they leave.
+        """
+        takes = np.array([hold.own for hold in self._takes or ()]).reshape(-1, 4, 4)
+        groups: dict[tuple[int, ...], list[tuple[float, Hold]]] = {}
+        for own, angle in product(self._givers.each, pitches):
+            hold = own.opened(self.giver, AJAR).pitched(angle)
+            down = -float(hold.at(scene)[2, 2])
+            left = float(_costs(hold.own, takes).min(initial=np.inf))
+            if down >= np.cos(self._lean) - 1e-6 and left < np.inf:
+                cost = LEANING * (1 - down) + LEVER * self._givers.lever(own) + left
+                groups.setdefault(_alike(hold), []).append((cost, hold))
+        each = [sorted(group, key=lambda one: one[0]) for group in groups.values()]
+        return [[hold for _, hold in group] for group in sorted(each, key=lambda one: one[0][0])]
 
     def present(self, scene: Scene, held: bool) -> list[Floats]:
         """Return the giver's posture where it gives the thing."""
@@ -338,13 +391,15 @@ class _Passing:
         start, frame = hand.like(scene, self._meeting.give), hand.held(scene, self._body)
         return near_posture(hand, frame, self._meeting.body, start, loose=True)
 
-    def take(self, scene: Scene) -> list[tuple[Hold, Floats]]:
+    def take(self, scene: Scene) -> tuple[Hold, Floats]:
         """Return the taker's grasp of the thing as it is held out now, and its posture there."""
         assert self._meeting is not None
         now, body = self.giver.qpos(scene), pose_matrix(*scene.body(self._body))
         grip = self.giver.link(now[None])[0] @ self._meeting.grip
-        _, hold, posture = self._take(scene, now[None], body[None], grip[None], ways=np.zeros(1))
-        return [(hold, posture)]
+        _, hold, posture = self._take(
+            scene, now[None], body[None], grip[None], np.zeros(1), self._meeting.released
+        )
+        return hold, posture
 
     def _meet(self, scene: Scene, start: Floats, in_hand: Floats, own: Hold | None) -> _Rendezvous:
         """Return where the giver gives the thing.
@@ -363,8 +418,12 @@ class _Passing:
         places, turns = zip(*self._places(), strict=True)
         gives = giver.reach(np.array(places), np.array(turns), grip, start[None])
         ways = giver.way(gives.qpos, start)
-        best = np.argsort(ways)[:GIVES]
-        if not len(best):
+        turned, unlike = gives.which % (len(places) // len(HEIGHTS)), list[int]()
+        for each in np.argsort(ways):
+            if turned[each] not in turned[unlike]:
+                unlike.append(each)
+        best = unlike[:GIVES]
+        if not best:
             raise StuckError(
                 f"{giver.arm!r} cannot reach to where {self.taker.arm!r} could take {self._body}"
             )
@@ -372,11 +431,18 @@ class _Passing:
         if own is not None:
             qpos = giver.opened(qpos, giver.motion.share(own.grasp.opening))
         links = giver.link(qpos)
-        number, _, _ = self._take(scene, qpos, links @ in_hand, links @ grip, ways[best])
-        return _Rendezvous(qpos[number], (links @ in_hand)[number], grip)
+        released = own.share if own else max(hold.share for hold in self._givers.each)
+        number, _, _ = self._take(scene, qpos, links @ in_hand, links @ grip, ways[best], released)
+        return _Rendezvous(qpos[number], (links @ in_hand)[number], grip, released)
 
     def _take(
-        self, scene: Scene, gives: Floats, bodies: Floats, grips: Floats, ways: Floats
+        self,
+        scene: Scene,
+        gives: Floats,
+        bodies: Floats,
+        grips: Floats,
+        ways: Floats,
+        released: float,
     ) -> tuple[int, Hold, Floats]:
         """Return which of some postures the giver gives from, the taker's grasp, and its posture.
 
@@ -386,53 +452,80 @@ class _Passing:
             bodies: Poses of the body then, (n, 4, 4) (m).
             grips: Poses of the giver's gripper then, (n, 4, 4) (m).
             ways: How far the giver has to go there, (n,) (rad).
+            released: How far the giver's gripper opens when it lets go, from 0 to 1.
 
         Raises:
             StuckError: If the taker can take it in none of them; says why.
         """
         giver, taker, name = self.giver, self.taker, self._body
+        now = taker.qpos(scene)
+        if self._takes is None:
+            self._takes = self._free_takes(scene, (0.0, *MANNERS[-1][1]))
+        holds = self._takes
         rows = [
-            (row, hold, bodies[row] @ hold.own)
-            for row in range(len(gives))
-            for hold in self._free_takes(scene)
+            each
+            for row, body in enumerate(bodies)
+            for each in self._suited(row, grips[row], body, holds)[: TAKES // len(bodies)]
         ]
-        rows = [row for row in rows if self._fits(grips[row[0]], row[2])]
         if not rows:
             raise StuckError(f"no grasp of {name} is left for {taker.arm!r} to take it by")
-        chosen = np.linspace(0, len(rows) - 1, min(TAKES, len(rows))).astype(int)
-        now = taker.opened(taker.qpos(scene), self.takers.share)
-        found: list[tuple[float, int, Hold, Floats]] = []
-        for number, hold, posture, off in self._reached([rows[i] for i in chosen], now):
-            gap = float(np.linalg.norm((bodies[number] @ hold.own - grips[number])[:3, 3]))
-            facing = float(grips[number][:3, 2] @ (bodies[number] @ hold.own)[:3, 2])
-            cost = float(ways[number]) + 0.5 * float(taker.way(posture, now)) + FACING * facing
-            found.append((cost + OFF * off - ROOMY * min(gap, WIDE), number, hold, posture))
+        found = [
+            (
+                cost + float(ways[row]) + 0.5 * float(taker.way(posture, now)) + OFF * off,
+                row,
+                hold,
+                posture,
+            )
+            for cost, row, hold, posture, off in self._reached(rows, now)
+        ]
         if not found:
             raise StuckError(f"{taker.arm!r} cannot reach {name} where {giver.arm!r} can give it")
         look = Look(self._task, scene, [name], {taker.owner: now})
-        for number, hold, posture in islice(_spread(found), MEETINGS):
-            body = bodies[number]
+        without = Look(self._task, scene, [], {taker.owner: now}, carried=name)
+        for row, own, posture in islice(_spread(found), MEETINGS):
+            body = bodies[row]
             moved = {name: (body[:3, 3], quaternion_of(body[:3, :3]))}
-            pose = body @ hold.own
-            back = shifted(pose, -BACK * pose[:3, 2])
-            before = near_posture(taker, hold.pads, back, posture)
-            if not before:
-                continue
-            towards = (grips[number] - pose)[:3, 3]
-            towards = towards / max(float(np.linalg.norm(towards)), TOUCHING)
-            closer = near_posture(taker, hold.pads, shifted(pose, CLOSER * towards), posture)
-            if not closer:
-                continue
-            ready, nearer = taker.like(scene, posture), taker.like(scene, posture)
-            ready[taker.columns], nearer[taker.columns] = before[0], closer[0]
-            takes = (posture, nearer, ready, (now + ready) / 2)
-            both = [self._both(gives[number], take) for take in takes]
-            both += [self._both(giver.opened(gives[number], self.released), posture)]
-            if look.overlap(both, moved) is None:
-                return number, hold, posture
+            gives_it = gives[row], giver.opened(gives[row], released)
+            for hold in (own, own.opened(taker, WIDER)):
+                closed = taker.motion.share(hold.grasp.opening)
+                at, shut = (taker.opened(posture, share) for share in (hold.share, closed))
+                hands = (self._both(give, take) for give in gives_it for take in (at, shut))
+                if without.overlap(hands) is not None:
+                    continue
+                way = self._on_the_way(scene, hold, body @ hold.own, grips[row], at)
+                off = taker.opened(way[2:], closed)
+                if (
+                    len(way)
+                    and look.overlap((self._both(gives[row], q) for q in way), moved) is None
+                    and without.overlap(self._both(gives[row], q) for q in off) is None
+                ):
+                    return row, hold, at
         raise StuckError(
             f"wherever {taker.arm!r} could take {name} from {giver.arm!r}, something is in the way"
         )
+
+    def _on_the_way(
+        self, scene: Scene, hold: Hold, pose: Floats, grip: Floats, posture: Floats
+    ) -> Floats:
+        """Return postures of the taker before it holds the thing, (6, dof) (rad, m).
+
+        They are one before the thing, one halfway to there, and four that are a little off: nearer
+        to the other's fingers and palm, and where the fingers part. If one is out of reach, the
+        array is empty.
+        """
+        taker, now = self.taker, self.taker.opened(self.taker.qpos(scene), hold.share)
+        fingers = (grip - pose)[:3, 3]
+        palm = fingers - PALM * (grip - pose)[:3, 2]
+        nearer = [way / max(float(np.linalg.norm(way)), TOUCHING) for way in (fingers, palm)]
+        off = CLOSER * np.array([*nearer, pose[:3, 1], -pose[:3, 1]])
+        found: list[Floats] = []
+        for way in (-BACK * pose[:3, 2], *off):
+            joints = near_posture(taker, hold.pads, shifted(pose, way), posture)
+            if not joints:
+                return np.empty((0, len(now)))
+            found.append(posture.copy())
+            found[-1][taker.columns] = joints[0]
+        return np.array([found[0], (now + found[0]) / 2, *found[1:]])
 
     def _places(self) -> Iterator[tuple[Floats, Floats]]:
         """Yield where and how turned the giver may hold the thing out."""
@@ -444,57 +537,79 @@ class _Passing:
             roll = rotation_about((0.0, 0.0, 1.0), np.array(k * pi / 2))
             yield middle + height * self._scale * UP, turn @ roll
 
-    def _fits(self, grip: Floats, take: Floats) -> bool:
-        """Return whether two hands may hold a thing so, the taker coming from its own side."""
-        apart = np.linalg.norm(grip[:3, 3] - take[:3, 3]) > APART
-        opposed = float(grip[:3, 2] @ take[:3, 2]) < OPPOSED
+    def _suited(
+        self, row: int, grip: Floats, body: Floats, holds: Sequence[Hold]
+    ) -> list[tuple[float, int, Hold, Floats]]:
+        """Return with which grasps two hands may hold a thing, the taker coming from its own side.
+
+        Args:
+            row: Number of the giver's posture.
+            grip: Pose of the giver's gripper, (4, 4) (m).
+            body: Pose of the thing then, (4, 4) (m).
+            holds: Grasps of the taker.
+
+        Returns:
+            What each costs (rad of way), that number, grasp and pose; the best first.
+        """
         way = (grip[:3, 3] - self.taker.base[:3, 3]) * (1.0, 1.0, 0.0)
-        ahead = take[:3, 2] @ way > -0.3 * np.linalg.norm(way)
-        return bool((apart or opposed) and ahead)
+        poses = body @ np.array([hold.own for hold in holds]).reshape(-1, 4, 4)
+        costs = _costs(grip, poses)
+        costs[poses[:, :3, 2] @ way < BACKWARD * np.linalg.norm(way)] = np.inf
+        best = [i for i in np.argsort(costs) if costs[i] < np.inf]
+        return [(float(costs[i]), row, holds[i], poses[i]) for i in best]
 
     def _reached(
-        self, rows: Sequence[tuple[int, Hold, Floats]], now: Floats
-    ) -> Iterator[tuple[int, Hold, Floats, float]]:
+        self, rows: Sequence[tuple[float, int, Hold, Floats]], now: Floats
+    ) -> Iterator[tuple[float, int, Hold, Floats, float]]:
         """Yield what the taker reaches, in several postures where there are some."""
-        by_width: dict[float, list[tuple[int, Hold, Floats]]] = {}
+        by_width: dict[float, list[tuple[float, int, Hold, Floats]]] = {}
         for row in rows:
-            by_width.setdefault(row[1].grasp.opening, []).append(row)
+            by_width.setdefault(row[2].grasp.opening, []).append(row)
         for alike in by_width.values():
-            poses = np.array([pose for _, _, pose in alike])
-            pads = alike[0][1].pads
-            for start in (now, *self.taker.scattered(now)):
-                near = start is now
+            poses, pads = np.array([pose for *_, pose in alike]), alike[0][2].pads
+            opened = self.taker.opened(now, alike[0][2].share)
+            for start in (opened, *self.taker.scattered(opened)):
                 found = self.taker.reach(
-                    poses[:, :3, 3], poses[:, :3, :3], pads, start[None], scatter=near
+                    poses[:, :3, 3], poses[:, :3, :3], pads, start[None], scatter=False
                 )
                 for which, qpos, off in zip(found.which, found.qpos, found.off, strict=True):
-                    number, hold, _ = alike[which]
-                    yield number, hold, qpos, float(off)
+                    cost, row, hold, _ = alike[which]
+                    yield cost, row, hold, qpos, float(off)
 
-    def _other_end(self, overlap: Overlap) -> set[str]:
-        """Return what overlaps the thing, if that is it."""
-        ends = {overlap.one.name, overlap.other.name}
-        return ends - {self._body} if self._body in ends else set()
+    def _free_takes(self, scene: Scene, asides: Sequence[float]) -> list[Hold]:
+        """Return the taker's grasps, from all sides, in which its hand has the thing to itself."""
+        narrow = [hold.opened(self.taker, AJAR) for hold in self.takers.each]
+        found: list[Hold] = []
+        for hold, angle, aside in product(narrow, PITCHES, asides):
+            moved = hold.pitched(angle).aside(aside)
+            free = (each for each in map(moved.drawn_back, DRAWN) if self._closes_on(scene, each))
+            if (first := next(free, None)) is not None:
+                found += [first, *[*free][-1:]]
+        return found
 
-    def _free_takes(self, scene: Scene) -> list[Hold]:
-        """Return the grasps, from before or behind, with which the hand is outside the thing."""
-        if self._takes is None:
-            hand = self.taker
-            now = hand.opened(hand.qpos(scene), self.takers.share)
-            room = room_of(self._task, scene)
-            link = hand.link(now[None])[0]
-            self._takes = []
-            for hold in (each for own in self.takers.each for each in (own, own.from_behind())):
-                for drawn in map(hold.drawn_back, DRAWN):
-                    body = link @ drawn.pads @ inverse_pose(drawn.own)
-                    moved = {self._body: (body[:3, 3], quaternion_of(body[:3, :3]))}
-                    if not any(
-                        overlap.depth > PRESSED and hand.links & self._other_end(overlap)
-                        for overlap in room.overlaps(scene, {hand.owner: now}, moved)
-                    ):
-                        self._takes.append(drawn)
-                        break
-        return self._takes
+    def _closes_on(self, scene: Scene, hold: Hold) -> bool:
+        """Return whether the taker's hand is outside the thing, and closes on it alone."""
+        wide = hold.grasp.opening
+        ajar, tight = hold.share, self.taker.motion.share(max(wide - 2 * TIGHT, 0.0))
+        if any(depth > PRESSED for depth in self._depths(scene, hold.pads, hold, ajar).values()):
+            return False
+        depths = self._depths(scene, hold.shut, hold, tight)
+        fingers = [depths.pop(link, 0.0) for link in self._fingers]
+        apart = all(depth < PRESSED for depth in depths.values())
+        return apart and min(fingers) > 0.0 and max(fingers) < DEEPEST
+
+    def _depths(self, scene: Scene, frame: Floats, hold: Hold, share: float) -> dict[str, float]:
+        """Return how deep links of the taker's hand would be in the thing that it has (m)."""
+        hand, room = self.taker, room_of(self._task, scene)
+        now = hand.opened(hand.qpos(scene), share)
+        body = hand.link(now[None])[0] @ frame @ inverse_pose(hold.own)
+        moved = {self._body: (body[:3, 3], quaternion_of(body[:3, :3]))}
+        found: dict[str, float] = {}
+        for one, other, depth in room.overlaps(scene, {hand.owner: now}, moved):
+            ends = {one.name, other.name}
+            if self._body in ends and (link := (ends & hand.links)):
+                found.setdefault(*link, depth)
+        return found
 
     def _both(self, give: Floats, take: Floats) -> dict[str, Floats]:
         """Return the postures of the robots, by name, with both arms somewhere."""
@@ -508,6 +623,22 @@ class _Passing:
 def _alike(hold: Hold) -> tuple[int, ...]:
     """Return what grasps have in common that hold a thing at about the same place and way."""
     return (*(hold.own[:3, 3] / PLACES).astype(int), *hold.own[:3, 2].round().astype(int))
+
+
+def _costs(grip: Floats, takes: Floats) -> Floats:
+    """Return what it costs to take a thing while another hand has it, (n,) (rad of way).
+
+    Args:
+        grip: Pose of the other hand's gripper, (4, 4) (m).
+        takes: Poses of the gripper that takes it, (n, 4, 4) (m).
+
+    Returns:
+        Infinity where there is no room for two hands.
+    """
+    gaps = np.linalg.norm(takes[:, :3, 3] - grip[:3, 3], axis=1)
+    facing = takes[:, :3, 2] @ grip[:3, 2]
+    costs = FACING * facing - ROOMY * np.minimum(gaps, WIDE)
+    return np.where((gaps > APART) | (facing < OPPOSED), costs, np.inf)
 
 
 def _spread(

@@ -222,6 +222,32 @@ def test_an_arm_hands_a_thing_over_to_another_make():
     played(env, hand_over(env, "left", "right", "peg", load("peg")))
 
 
+@pytest.mark.long
+def test_an_arm_hands_over_what_it_holds_already():
+    env, peg = made(Hand), load("peg")
+    script = hand_over(env, "left", "right", "peg", peg, held=True)
+    holding = (
+        *grasp(env, "left", "peg", peg, parts=["end"], up=0.08),
+        *lift(env, "left", "peg", 0.1),
+    )
+    played(env, {**script, "left": (*holding, *script["left"])})
+
+
+class Cup(TwoArms):
+    cup = Object("cup", spawn=Area(x=-0.1, y=-0.1, yaw=0.3))
+
+    def evaluate(self, state):
+        """Success: the right arm alone holds it."""
+        alone = state.is_grasping("right", "cup") & ~state.is_grasping("left", "cup")
+        return {"success": alone & (state.tcp_distance("left", "cup") > 0.08)}
+
+
+@pytest.mark.long
+def test_a_giver_leaves_the_taker_a_grasp_where_hands_from_above_have_no_room():
+    env = made(Cup)
+    played(env, hand_over(env, "left", "right", "cup", load("cup")))
+
+
 class Together(TwoArms):
     tray = Object("tray", spawn=Area(x=-0.1, yaw=pi / 2))
 
@@ -240,6 +266,27 @@ def test_two_arms_of_different_makes_lift_a_tray_level():
         env.step(action[None])
         turned = env.state.pose("tray")[0, 3:]
         assert 2 * np.hypot(*turned[1:3]) < 0.2  # rad from level
+
+
+class Opened(OneArm):
+    max_episode_steps = 40
+
+    def evaluate(self, state):
+        """Success: the fingers are half open."""
+        return {"success": np.abs(state.qpos("arm")[:, -2:] - 0.02).max(axis=1) < 1e-3}
+
+
+def test_how_far_a_gripper_opens_is_worked_out_when_its_waypoint_begins():
+    env, seen = made(Opened), []
+
+    def half(scene: Scene) -> float:
+        seen.append(scene.qpos("arm")[-1])
+        return 0.5
+
+    script = [Waypoint("shut", share=0.0, steps=8), Waypoint("open", share=half)]
+    played(env, {"arm": script})
+    assert len(seen) == 1
+    assert seen[0] < 0.01  # m; not before
 
 
 def test_a_gripper_goes_on_as_before_where_a_waypoint_says_nothing():
