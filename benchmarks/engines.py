@@ -20,13 +20,13 @@ from tasks import TaskEnv, make
 
 
 def engines(
-    *, seeds: int = 5, tasks: tuple[str, ...] = (), out: Path = DOCS / "engines.json"
+    *, seeds: int = 5, tasks: tuple[str, ...] | None = None, out: Path = DOCS / "engines.json"
 ) -> int:
     """Let experts plan in MuJoCo, and play their actions there and in SAPIEN in turns.
 
     Args:
         seeds: How many episodes of each task; those in the record are not played again.
-        tasks: Which tasks; all with an expert if there are none.
+        tasks: Which tasks; all with an expert if not given.
         out: The record, written after every episode; the page is beside it.
 
     Raises:
@@ -34,7 +34,7 @@ def engines(
     """
     torch.set_num_threads(1)
     record = read_record(out, versions={}, episodes={})
-    for task in tqdm(tasks or tuple(list_experts()), disable=None):
+    for task in tqdm(list_experts() if tasks is None else tasks, disable=None):
         seen = record["episodes"].setdefault(task, {})
         missing = [seed for seed in range(seeds) if str(seed) not in seen]
         envs = {name: make(task, simulator=name, obs_mode="none") for name in SIMULATORS}
@@ -52,7 +52,15 @@ def engines(
         if episode["reason"]
     ]
     shown = table(heads, rows)
-    write_page(out, "engines", versions=record["versions"], table=shown, failures=failures)
+    untried = ", ".join(task for task in list_experts() if task not in record["episodes"])
+    write_page(
+        out,
+        "engines",
+        versions=record["versions"],
+        table=shown,
+        failures=failures,
+        untried=untried,
+    )
     return 0
 
 

@@ -27,6 +27,7 @@ COMMANDS = {
     "placing": ["placing"],
     "objects": ["objects", "--objects", "mug"],  # which needs no package
     "experts": ["experts", "--tasks"],
+    "engines": ["engines", "--tasks"],
     "conversions": ["conversions", "--modes", "--tasks", "PickCube-v1"],
     "processors": ["processors", "--render"],
     "imitation": ["imitation"],

@@ -66,6 +66,7 @@ def test_a_receipt_names_engine_and_version(tmp_path):
     receipt = json.loads(path.read_text())
     assert receipt["making"]["simulator"] == "mujoco"
     assert mujoco.__version__ in json.dumps(receipt)
+    assert main(["verify", str(path), "--workers", "0"]) == 0
 
 
 def test_a_description_says_that_a_clone_has_other_physics(capsys):

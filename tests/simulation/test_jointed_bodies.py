@@ -1,5 +1,7 @@
 """Bodies with joints in physics: stops, springs, where parts are, what a reset does to them."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -9,11 +11,20 @@ from objects.registry import CATALOGUE
 from objects.shapes import Box
 from objects.solids import part_poses
 from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.backend import ENGINES, SIMULATORS
 from robots import DescriptorError, SimulationError, UnknownNameError
 
 JOINTED = [name for name in CATALOGUE if ObjectRegistry.load(name).joints]
 POST = Box((0.02, 0.02, 0.1))
 ARM = Box((0.1, 0.01, 0.01), position=(0.1, 0.0, 0.0))
+
+
+@pytest.fixture(autouse=True, params=SIMULATORS)
+def simulator(request, monkeypatch):
+    """Try everything in each simulator."""
+    pytest.importorskip(ENGINES[request.param])
+    made = functools.partial(Simulation, simulator=request.param)
+    monkeypatch.setattr("tests.simulation.test_jointed_bodies.Simulation", made)
 
 
 def jointed(*joints, kind="static", **more):

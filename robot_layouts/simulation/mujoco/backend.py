@@ -36,6 +36,7 @@ from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, subste
 from robot_layouts.simulation.mujoco.pictures import Pictures
 from robot_layouts.simulation.mujoco.threads import Threads
 from robot_layouts.simulation.mujoco.world import MujocoWorld
+from robot_layouts.simulation.physics import PhysicsSettings
 from robot_layouts.simulation.scene.cameras import AnyCamera, View
 from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.solvers import (
@@ -74,18 +75,19 @@ class MujocoBackend:
         if self._robots is None:
             self._robots = RobotModels(first.layout, visuals=bool(first.visuals))
         robots = self._robots
-        models: dict[tuple[WorldBody, ...], Any] = {}
+        models: dict[tuple[PhysicsSettings, tuple[WorldBody, ...]], Any] = {}
         built: dict[int, MujocoWorld] = {}
         for number, world in worlds.items():
-            bodies = tuple(world.bodies.values())
-            if bodies not in models:
-                models[bodies] = robots.compile(world)
-                self._index = Inventory(models[bodies], world, robots.cell)
+            alike = world.physics, tuple(world.bodies.values())
+            if alike not in models:
+                models[alike] = robots.compile(world)
+                self._index = Inventory(models[alike], world, robots.cell)
             inner = substeps_of(world.physics.timestep, robots.timestep)
-            built[number] = MujocoWorld(world, models[bodies], self._index, inner)
+            built[number] = MujocoWorld(world, models[alike], self._index, inner)
         self.worlds = [
             built.get(i) or self.worlds[i] for i in range(max(len(self.worlds), len(built)))
         ]
+        self._pictures.keep(self.worlds)
         self._drives = JointDrives(self.worlds, first.layout, self._index)
         self._forces: dict[tuple[Pair, ...], ForceReader] = {}
         if self._arms is not None:

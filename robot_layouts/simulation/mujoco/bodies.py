@@ -146,5 +146,4 @@ def _joint_numbers(joint: Joint) -> dict[str, Any]:
         "stiffness": joint.stiffness,
         "springref": joint.rest,
         "damping": joint.damping,
-        "frictionloss": joint.friction,
     }

@@ -23,7 +23,7 @@ from robot_layouts.simulation.mujoco.library import mujoco
 from robot_layouts.simulation.mujoco.visuals import add_lamps
 from robot_layouts.simulation.physics import PhysicsSettings
 from robot_layouts.simulation.speeds import joint_speeds
-from robot_layouts.simulation.world import World
+from robot_layouts.simulation.world import World, part_name
 from robots import SimulationError
 
 # Without these nothing that is light stays between fingers: friction that gives less than what
@@ -47,11 +47,13 @@ class RobotModels:
             DescriptorError: If a descriptor contradicts its URDF.
         """
         self.cell = ExportedCell.read(layout, visuals=visuals)
-        self._meshes = tempfile.TemporaryDirectory(prefix="robot-layouts-")
-        folder = Path(self._meshes.name)
-        model = mjcf_of(self.cell, "worlds", folder, visuals=visuals)
+        with tempfile.TemporaryDirectory(prefix="robot-layouts-") as name:
+            folder = Path(name)
+            model = mjcf_of(self.cell, "worlds", folder, visuals=visuals)
+            files = [path for path in folder.rglob("*") if path.is_file()]
+            meshes = {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
         self.timestep = model.timestep
-        self._spec: Any = mujoco.MjSpec.from_string(model.text(str(folder)))
+        self._spec: Any = mujoco.MjSpec.from_string(model.text(""), assets=meshes)
 
     def compile(self, world: World) -> Any:
         """Return MuJoCo's model of a world.
@@ -80,6 +82,7 @@ class RobotModels:
         self._let_floors_through(spec, world)
         model = spec.compile()
         _drive_by_force(model)
+        _rub_joints(model, world)
         return model
 
     def _set_friction(self, spec: Any, friction: float) -> None:
@@ -136,6 +139,18 @@ def _drive_by_force(model: Any) -> None:
     model.actuator_ctrllimited[:] = 0
     driven = model.jnt_dofadr[model.actuator_trnid[:, 0]]
     model.dof_damping[driven] = model.dof_frictionloss[driven] = 0.0
+
+
+def _rub_joints(model: Any, world: World) -> None:
+    """Let joints of things rub with their coefficient of the weight that they carry.
+
+    PhysX takes what they bear at every moment; of a drawer that lies level that is the same.
+    """
+    strength = float(np.linalg.norm(world.physics.gravity))
+    for body in world.bodies.values():
+        for joint in body.joints:
+            part = model.body(PREFIX + part_name(body.name, joint.name))
+            model.dof_frictionloss[part.dofadr] = joint.friction * part.subtreemass * strength
 
 
 @dataclass(frozen=True)

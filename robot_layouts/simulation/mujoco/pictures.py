@@ -39,6 +39,12 @@ class Pictures:
         self._renderers: dict[tuple[int, int, int], Any] = {}
         self._process = os.getpid()
 
+    def keep(self, worlds: Sequence[MujocoWorld]) -> None:
+        """Let go of what draws worlds that were built before these."""
+        used = {id(world.as_built) for world in worlds}
+        for key in [key for key in self._renderers if key[0] not in used]:
+            self._renderers.pop(key).close()
+
     def look(
         self,
         world: MujocoWorld,
