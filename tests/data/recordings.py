@@ -19,14 +19,16 @@ PANDA_ARM = [f"panda_joint{i}" for i in range(1, 8)]
 FINGERS = ["panda_finger_joint1", "panda_finger_joint2"]
 
 
-def record(path: Path, task_id: str, lengths: list[int], robots: Any = None) -> Path:
-    """Record episodes of random actions; that with ``lengths[i]`` steps has seed 10 + i."""
+def record(
+    path: Path, task_id: str, lengths: list[int], robots: Any = None, *, first: int = 10
+) -> Path:
+    """Record episodes of random actions; that with ``lengths[i]`` steps has seed ``first`` + i."""
     task = tasks.make(task_id, robots=robots, obs_mode="none")
     rng = np.random.default_rng(0)
     with Recorder(path, task) as recorder:
         for i, steps in enumerate(lengths):
             actions = rng.uniform(-1, 1, (steps, task.layout.action_dim)).astype(np.float32)
-            recorder.add(play(task, 10 + i, actions))
+            recorder.add(play(task, first + i, actions))
     return path
 
 

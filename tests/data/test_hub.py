@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -221,10 +223,53 @@ def test_what_was_read_once_is_read_without_the_hub(hub, recording, monkeypatch)
     assert local_place(f"hub:{NAME}@{first.name}") == first
 
 
+def test_it_is_certified_merged_and_reported_where_it_is_named(hub, recording, tmp_path, capsys):
+    other = tmp_path / "other"
+    other.mkdir()
+    record(other / "trajectory.h5", TASK, [2], first=20)
+    assert push(recording, NAME) == push(other, "lab/others") == 0
+    name, certificate = f"hub:{NAME}", tmp_path / "certificate.json"
+    assert main(["certify", name, "--workers", "0", "--out", str(certificate)]) == 0
+    page = tmp_path / "page.html"
+    shown = ["--clips", "0", "--clearances", "0", "--out", str(page)]
+    assert main(["report", name, *shown]) == 0
+    assert f"<title>{name}</title>" in page.read_text()
+    merged = str(tmp_path / "merged")
+    assert main(["merge", name, "hub:lab/others", "--out", merged]) == 0
+    with Recording(merged) as file:
+        assert file.seeds == (10, 11, 20)
+
+
 def test_a_certificate_needs_a_place(hub, recording, capsys, tmp_path):
     assert push(recording, NAME) == 0
     assert main(["certify", f"hub:{NAME}", "--workers", "0"]) == 1
     assert f"hub:{NAME} has no room for its certificate; say where" in capsys.readouterr().err
+
+
+def test_a_recording_with_pictures_is_refused_under_a_free_licence(
+    hub, recording, tmp_path, capsys
+):
+    folder = tmp_path / "seen"
+    shutil.copytree(recording, folder)
+    about = json.loads((folder / "trajectory.json").read_text())
+    about["env_info"]["env_kwargs"]["obs_mode"] = "rgb"
+    (folder / "trajectory.json").write_text(json.dumps(about))
+    assert push(folder, NAME, "--licence", "mit") == 1
+    said = capsys.readouterr().err
+    assert "(observations (rgb)) show panda_stick (arm), CC BY-NC 4.0, table and floor" in said
+    assert hub.requests == []
+    assert push(folder, NAME) == 0
+    repository = hub.repositories[NAME]
+    assert b"license: cc-by-nc-4.0\n" in repository.commits[repository.head]["README.md"]
+
+
+def test_a_recording_that_is_not_finished_is_not_pushed(hub, recording, tmp_path, capsys):
+    folder = tmp_path / "unfinished"
+    shutil.copytree(recording, folder)
+    (folder / "trajectory.parts").mkdir()
+    (folder / "trajectory.parts/00007").touch()
+    assert push(folder, NAME) == 1
+    assert "is not finished: trajectory.parts holds episodes" in capsys.readouterr().err
 
 
 def described(pictures: tuple[str, ...], robot: str = "panda", task: str = TASK) -> Described:

@@ -38,20 +38,20 @@ API = "/api/datasets/"
 NOBODY = "http://127.0.0.1:9/x"
 
 
-def _reset(handler: hub_server._Handler, body: bytes) -> None:
+def _reset(handler: hub_server.Handler, body: bytes) -> None:
     handler.reset()
 
 
-def _nonsense(handler: hub_server._Handler, body: bytes) -> None:
+def _nonsense(handler: hub_server.Handler, body: bytes) -> None:
     handler.wfile.write(b"\x16\x03\x01 this is no HTTP\r\n\r\n")
     handler.close_connection = True
 
 
-def _silence(handler: hub_server._Handler, body: bytes) -> None:
+def _silence(handler: hub_server.Handler, body: bytes) -> None:
     handler.rfile.read(1)  # returns when the client goes away
 
 
-def _many_headers(handler: hub_server._Handler, body: bytes) -> None:
+def _many_headers(handler: hub_server.Handler, body: bytes) -> None:
     handler._send(200, body, {f"X-{i}": "x" * 1000 for i in range(90)})
 
 
