@@ -36,11 +36,14 @@ def test_what_is_inside_goes_by_the_frame_of_the_container():
 
 def test_the_instruction_says_what_counts_and_the_observation_does_not():
     env = tasks.make("CellThrowLevers-v1", num_envs=2)
-    seen, info = env.reset(seed=3)  # environment i has seed 3 + i
-    assert env.phrasings == [3, 4]
-    named = dict(zip(env.arms, env.task._named(env.state), strict=True))
+    info = env.reset(seed=3)[1]  # environment i has seed 3 + i
+    task: Any = env.task
+    assert task.phrasings == [3, 4]
+    named = dict(zip(task.arms, task._named(env.state), strict=True))
     for i, words in enumerate(info["instruction"]):
-        assert [arm for arm in env.arms if arm in words] == [a for a in env.arms if named[a][i]]
-    assert seen.shape[1] == env.single_observation_space.shape[0]
-    assert not any("named" in name for name in env.observation_slices)
+        assert [arm for arm in task.arms if arm in words] == [a for a in task.arms if named[a][i]]
+    assert {name.partition("_")[0] for name in env.observation_slices if "." not in name} == {
+        *task.arms,
+        "lever",
+    }
     env.close()
