@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import atan2, hypot
 from typing import Any, ClassVar
 
-from robot_layouts.simulation import PhysicsSettings, State
-from robot_layouts.simulation.maths import Array, Floats, floats
+from robot_layouts.simulation import PhysicsSettings, State, World
+from robot_layouts.simulation.maths import Array, Flags, Floats, floats
+from robots.descriptor import Vector3
 from tasks.engine.env import MultiRobotTask
 from tasks.engine.task import Info
 from tasks.language.bodies import Body, Object, WideTable
-from tasks.language.terms import closeness
+from tasks.language.randomness import EpisodeRandom
+from tasks.language.terms import closeness, inverse, transform
 
 OF_STAGES = 0.6  # of the reward
 
@@ -54,10 +57,74 @@ class CellTask(MultiRobotTask):
         mean: Any = sum(near[1:], near[0]) / len(near)
         return OF_STAGES * info["stage_score"] + (1.0 - OF_STAGES) * mean
 
+    def before(self, arm: str, out: float, aside: float = 0.0) -> tuple[float, float]:
+        """Return a place before an arm of a ring, x and y (m, world).
+
+        Args:
+            arm: The arm.
+            out: How far the place is from the origin towards the arm's base (m).
+            aside: How far it is from that line, to the right of who looks along it (m).
+        """
+        x, y, _ = self.layout.arm(arm).base_position
+        x, y = x / hypot(x, y), y / hypot(x, y)
+        return out * x + aside * y, out * y - aside * x
+
+    def lay_before(
+        self,
+        world: World,
+        rng: EpisodeRandom,
+        arm: str,
+        body: str,
+        low: tuple[float, float],
+        high: tuple[float, float],
+        turned: tuple[float, float] | None = None,
+    ) -> None:
+        """Lay a body before an arm of a ring.
+
+        Args:
+            world: The world.
+            rng: What its place is drawn from.
+            arm: The arm.
+            body: The body.
+            low: The least ``out`` and ``aside`` of `before` (m).
+            high: The largest (m).
+            turned: How far its x axis is turned from the way to the arm's base, the least and the
+                largest (rad); None for any angle if physics moves it, else for how it rests.
+        """
+        out, aside = rng.uniform_between(low, high).tolist()
+        x, y = self.before(arm, out, aside)
+        thing: Any = self.bodies[body]
+        turn = thing.lying
+        if turned is not None:
+            towards = atan2(*self.before(arm, 1.0)[::-1])
+            turn = rng.yaw_quaternion(towards + turned[0], towards + turned[1])
+        elif thing.kind == "dynamic":
+            turn = rng.yaw_quaternion()
+        world.set_pose(body, (x, y, thing.height), turn)
+
+    @property
+    def phrasings(self) -> list[int]:
+        """Which of its instructions each environment's episode has, one number each."""
+        return [rng.phrasing(len(self.instruction)) for rng in self._rngs]
+
     @property
     def arms(self) -> tuple[str, ...]:
         """The arms by their names, in order."""
         return tuple(self.layout.arms)
+
+    def is_within(self, state: State, body: str, other: str, low: Vector3, high: Vector3) -> Flags:
+        """Tell whether a body's origin is between two corners in another one's frame, (N,) bool.
+
+        Args:
+            state: The state.
+            body: The body.
+            other: Whose frame counts, such as a container's.
+            low: The one corner (m).
+            high: The other (m).
+        """
+        place = transform(inverse(state.pose(other)), state.position(body))
+        inside: Any = (place >= state.array((low,))) & (place <= state.array((high,)))
+        return inside.all(1)
 
     def count(self, flags: Sequence[Array]) -> Floats:
         """Return how many of some flags, each (N,) bool, are true, (N,)."""

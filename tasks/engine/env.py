@@ -564,7 +564,7 @@ class TaskEnv(Remade):
         if self._progress is not None:
             info |= self._progress.told(info)
         if len(self._phrasings):
-            numbers = [(rng.seed + rng.resets) % len(self._phrasings) for rng in self._rngs]
+            numbers = [rng.phrasing(len(self._phrasings)) for rng in self._rngs]
             info[INSTRUCTION] = self._phrasings[numbers]
         return info
 

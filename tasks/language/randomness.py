@@ -79,6 +79,10 @@ class EpisodeRandom:
         """Where the numbers of the present episode come from that are not the task's own."""
         return Stream(self.seed, self.resets)
 
+    def phrasing(self, count: int) -> int:
+        """Return which of so many instructions the present episode has."""
+        return (self.seed + self.resets) % count
+
     def restart(self, seed: int) -> None:
         """Start both streams anew, as an explicit seed does."""
         self._seeds.seed(seed)  # a new stream costs fifty times as much

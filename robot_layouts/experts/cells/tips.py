@@ -1,0 +1,221 @@
+"""What tips do, of sticks, flanges and closed fingers: they push bodies, and press on them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from math import pi
+
+import numpy as np
+
+from robot_layouts.experts.reaching import reaching
+from robot_layouts.experts.script import CLOSED, Scene, Waypoint
+from robot_layouts.kinematics.rotations import Floats
+from tasks import TaskEnv
+
+Place = Callable[[Scene], Floats]
+"""A place, (3,) (m, world), given the scene."""
+
+PUSHING = (0.0, 0.3, 0.6, -0.3)  # how far grippers lean from straight down (rad)
+PRESSING = (0.0, 0.3, -0.3, 0.6)
+UPRIGHT = (0.0, 0.15, -0.15)
+HIGH, OVER = 0.14, 0.06  # of tips on their way over the table, and over what they press (m)
+CONTACT = 0.04  # from a tip's middle to that of a block of 5 cm when they touch, about (m)
+NEARER, UP = 0.65, 0.35  # share of its reach, and m, at which a tip is out of the way
+LEAST = 0.012  # m; of a stroke, unless less is left
+PRESSED = 8  # control steps that pressing takes, however far the tip comes
+BEYOND = 0.15  # m behind its end, where a push aims; so it stays steady near the end
+
+
+def stand_back(task: TaskEnv, robot: str, name: str = "back") -> Waypoint:
+    """Return the waypoint with which an arm goes out of the others' way.
+
+    Its tip comes over the table, nearer to its base.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm.
+        name: What it is called.
+    """
+
+    def place(scene: Scene) -> Floats:
+        base, tip = scene.base(robot)[:2], scene.tcp(robot)[0][:2]
+        return np.array([*(base + NEARER * (tip - base)), UP])
+
+    return reaching(task, robot, name, place, near=0.1)
+
+
+def push(
+    task: TaskEnv,
+    robot: str,
+    body: str,
+    end: Place,
+    *,
+    gap: float = 0.08,
+    strokes: int = 10,
+    height: float = 0.025,
+    after: Sequence[str] = (),
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints with which a tip pushes a block to a place, aiming at every stroke.
+
+    They are ``above``, ``behind``, ``push 0`` …, ``back`` and ``away``, with the block's name.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm; its fingers stay closed, if it has some.
+        body: The block.
+        end: Where it is to lie; its height does not count.
+        gap: Between the tip and the block's middle when the tip comes down (m).
+        strokes: In how many parts it is pushed.
+        height: Of the tip over the table (m).
+        after: Waypoints of other arms that come before.
+    """
+    go = partial(reaching, task, robot, leans=PUSHING, as_it_is=False, gripper=CLOSED)
+    line: list[Floats] = []  # where it aims, and how far from that the block is to lie (m)
+
+    def aim(scene: Scene) -> tuple[Floats, Floats]:
+        """Return where the push aims, and the way from there to the block, of length 1."""
+        place, goal = scene.body(body)[0][:2], end(scene)[:2]
+        if not line:
+            line.append(goal + BEYOND * (goal - place) / np.linalg.norm(goal - place))
+        away = place - line[0]
+        return line[0], away / np.linalg.norm(away)
+
+    def behind(scene: Scene, up: float) -> Floats:
+        return np.array([*(scene.body(body)[0][:2] + gap * aim(scene)[1]), up])
+
+    def along(scene: Scene, left: int) -> Floats:
+        target, away = aim(scene)
+        far = float((scene.tcp(robot)[0][:2] - target) @ away)
+        return np.array([*(target + (far + (BEYOND + CONTACT - far) / left) * away), height])
+
+    def back(scene: Scene, up: float) -> Floats:
+        return np.array([*(scene.tcp(robot)[0][:2] + 0.06 * aim(scene)[1]), up])
+
+    return (
+        go(f"above {body}", partial(behind, up=HIGH), near=0.05, after=tuple(after)),
+        go(f"behind {body}", partial(behind, up=height), near=0.03),
+        *(
+            go(f"push {body} {i}", partial(along, left=strokes - i), near=0.03)
+            for i in range(strokes)
+        ),
+        go(f"back {body}", partial(back, up=height), near=0.1),
+        go(f"away {body}", partial(back, up=HIGH), near=0.1),
+    )
+
+
+def advance(
+    task: TaskEnv,
+    robot: str,
+    body: str,
+    start: Place,
+    ahead: Place,
+    left: Callable[[Scene], float],
+    *,
+    strokes: int = 12,
+    back: float = 0.06,
+    beside: Sequence[str] = (),
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints with which a tip pushes something straight until no way is left.
+
+    They are ``above``, ``at``, ``push 0`` … and ``back``, each with the body's name.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm; its fingers stay closed, if it has some.
+        body: What is pushed.
+        start: Where the tip begins, a little behind it.
+        ahead: Which way it is pushed, of length 1.
+        left: How far it still has to go (m).
+        strokes: In how many parts; before each, what is left is looked at anew.
+        back: How far the tip goes back in the end (m).
+        beside: Other arms that push the same in step.
+    """
+    go = partial(reaching, task, robot, leans=UPRIGHT, as_it_is=False, gripper=CLOSED)
+    line: list[Floats] = []  # where it begins, and which way it goes
+
+    def at(scene: Scene, up: float) -> Floats:
+        line[:] = line or [start(scene), ahead(scene)]
+        return line[0] + np.array([0.0, 0.0, up])
+
+    def along(scene: Scene, stroke: int) -> Floats:
+        begin, way = line
+        done = float((scene.tcp(robot)[0] - begin) @ way)
+        if stroke == strokes:
+            return begin + (done - back) * way
+        more = left(scene)
+        return begin + (done + max(more / (strokes - stroke), min(LEAST, more))) * way
+
+    def step(stroke: int) -> Waypoint:
+        before = f"push {body} {stroke - 1}" if stroke else f"at {body}"
+        waits = tuple(f"{other}.{before}" for other in beside)
+        return go(f"push {body} {stroke}", partial(along, stroke=stroke), near=0.03, after=waits)
+
+    return (
+        go(f"above {body}", partial(at, up=HIGH), near=0.05),
+        go(f"at {body}", partial(at, up=0.0), near=0.03),
+        *map(step, range(strokes)),
+        go(f"back {body}", partial(along, stroke=strokes), near=0.05),
+    )
+
+
+def sweep(
+    task: TaskEnv,
+    robot: str,
+    body: str,
+    path: Callable[..., Floats],
+    *,
+    count: int = 10,
+    after: Sequence[str] = (),
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints with which a tip goes along a path: above, and sweep 0 and on.
+
+    Each is called by that word and the body's name.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm; its fingers stay closed, if it has some.
+        body: What is swept along.
+        path: Given the scene and a share of the path, from 0 to 1, where the tip is then, (3,) (m).
+        count: In how many parts.
+        after: Waypoints of other arms that come before.
+    """
+    go = partial(reaching, task, robot, leans=UPRIGHT, as_it_is=False, gripper=CLOSED)
+
+    def above(scene: Scene) -> Floats:
+        return path(scene, 0.0) + np.array([0.0, 0.0, HIGH])
+
+    return (
+        go(f"above {body}", above, near=0.05, after=tuple(after)),
+        *(
+            go(f"sweep {body} {i}", partial(path, share=i / count), near=0.06)
+            for i in range(count + 1)
+        ),
+    )
+
+
+def press_down(
+    task: TaskEnv, robot: str, body: str, top: Place, depth: float, *, after: Sequence[str] = ()
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints with which a tip presses on something and stays: over, press.
+
+    Each is called by that word and the body's name.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm; its fingers stay closed, if it has some.
+        body: What is pressed.
+        top: Where.
+        depth: How far the tip goes below that (m).
+        after: Waypoints of other arms that come before it is pressed.
+    """
+    go = partial(reaching, task, robot, leans=PRESSING, as_it_is=False, gripper=CLOSED)
+
+    def at(scene: Scene, up: float) -> Floats:
+        return top(scene) + np.array([0.0, 0.0, up])
+
+    return (
+        go(f"high {body}", partial(at, up=2 * OVER), near=0.03),
+        go(f"over {body}", partial(at, up=OVER), near=0.02),
+        go(f"press {body}", partial(at, up=-depth), near=pi, steps=PRESSED, after=tuple(after)),
+    )

@@ -1,0 +1,49 @@
+"""What cells share: places before arms, what is inside something, what the instruction chooses."""
+
+from math import hypot, sqrt
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import layouts
+import tasks
+from tasks import CellTask
+
+ARMS = ("first", "second", "third")
+RING: Any = SimpleNamespace(layout=layouts.ring(dict.fromkeys(ARMS, "panda"), radius=0.8))
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_place_before_an_arm_is_on_the_way_to_it_or_to_the_right_of_that(arm: str):
+    x, y, _ = RING.layout.arm(arm).base_position
+    assert CellTask.before(RING, arm, hypot(x, y)) == pytest.approx((x, y))
+    near, right = CellTask.before(RING, arm, 0.3), CellTask.before(RING, arm, 0.3, 0.1)
+    assert np.subtract(right, near) == pytest.approx(0.1 * np.array((y, -x)) / hypot(x, y))
+
+
+def test_what_is_inside_goes_by_the_frame_of_the_container():
+    quarter = np.array([[1.0, 2.0, 0.0, sqrt(0.5), 0.0, 0.0, sqrt(0.5)]] * 2, np.float32)
+    along = np.array([[1.0, 2.1, 0.0], [1.1, 2.0, 0.0]], np.float32)  # its own x is the world's y
+    state: Any = SimpleNamespace(
+        pose=lambda body: quarter, position=lambda body: along, array=np.float32
+    )
+    low, high = (-0.2, -0.05, -0.01), (0.2, 0.05, 0.01)
+    inside = CellTask.is_within(RING, state, "cube", "tote", low, high)
+    assert inside.tolist() == [True, False]
+
+
+def test_the_instruction_says_what_counts_and_the_observation_does_not():
+    env = tasks.make("CellThrowLevers-v1", num_envs=2)
+    info = env.reset(seed=3)[1]  # environment i has seed 3 + i
+    task: Any = env.task
+    assert task.phrasings == [3, 4]
+    named = dict(zip(task.arms, task._named(env.state), strict=True))
+    for i, words in enumerate(info["instruction"]):
+        assert [arm for arm in task.arms if arm in words] == [a for a in task.arms if named[a][i]]
+    assert {name.partition("_")[0] for name in env.observation_slices if "." not in name} == {
+        *task.arms,
+        "lever",
+    }
+    env.close()
