@@ -90,7 +90,7 @@ class Rehearsal:
         self.task = task.task_class(scenario)
         several = len(self.task.layout.arms) > 1
         self._watch = ArmWatch(self.task, strict=False) if several else None
-        self._alone = RobotsAlone(self.task.layout, scenario.physics)
+        self._alone = RobotsAlone(self.task.layout, scenario.physics, simulator=scenario.simulator)
         self._tape: EpisodeTape | None = None
         self.fresh = False  # whether an episode has begun, in which nothing was done yet
 

@@ -35,7 +35,8 @@ class Room:
         self._solid = tuple(body for body in bodies if any(s.collides for s in body.shapes))
         self.movable = [b.name for b in self._solid if not _stays(b)]
         build = partial(_add, bodies=self._solid)
-        self._alone = RobotsAlone(task.standing(), task.scenario.physics, build)
+        physics, simulator = task.scenario.physics, task.scenario.simulator
+        self._alone = RobotsAlone(task.standing(), physics, build, simulator=simulator)
         self._robots = tuple(task.standing())
 
     def overlaps(

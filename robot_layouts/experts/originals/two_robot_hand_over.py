@@ -161,6 +161,7 @@ class _Search:
             task.standing(),
             task.scenario.physics,
             lambda world, _: task.table.add_to(world, "table"),
+            simulator=task.scenario.simulator,
         )
         self._usual = self._parts({})
         one_body = self._giver.owner == self._taker.owner

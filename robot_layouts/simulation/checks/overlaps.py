@@ -28,6 +28,8 @@ class RobotsAlone:
         layout: Layout,
         physics: PhysicsSettings | None = None,
         build: Callable[[World, int], None] = empty,
+        *,
+        simulator: str = "sapien3",
     ) -> None:
         """Build the world.
 
@@ -35,12 +37,15 @@ class RobotsAlone:
             layout: The robots.
             physics: Solver settings; None is SAPIEN's own defaults.
             build: Adds what else is there.
+            simulator: What builds it; see `robot_layouts.simulation.Simulation`.
 
         Raises:
             RobotLayoutsError: If a robot cannot be built.
         """
         timestep = (physics or SAPIEN_DEFAULTS).timestep
-        self._simulation = Simulation(layout, build, 1, physics, control_frequency=1 / timestep)
+        self._simulation = Simulation(
+            layout, build, 1, physics, control_frequency=1 / timestep, simulator=simulator
+        )
         self._still = np.zeros((1, layout.action_dim), np.float32)
 
     def overlaps(
