@@ -21,28 +21,9 @@ PRESSING = (0.0, 0.3, -0.3, 0.6)
 UPRIGHT = (0.0, 0.15, -0.15)
 HIGH, OVER = 0.14, 0.06  # of tips on their way over the table, and over what they press (m)
 CONTACT = 0.04  # from a tip's middle to that of a block of 5 cm when they touch, about (m)
-NEARER, UP = 0.65, 0.35  # share of its reach, and m, at which a tip is out of the way
 LEAST = 0.012  # m; of a stroke, unless less is left
 PRESSED = 8  # control steps that pressing takes, however far the tip comes
 BEYOND = 0.15  # m behind its end, where a push aims; so it stays steady near the end
-
-
-def stand_back(task: TaskEnv, robot: str, name: str = "back") -> Waypoint:
-    """Return the waypoint with which an arm goes out of the others' way.
-
-    Its tip comes over the table, nearer to its base.
-
-    Args:
-        task: Says where the arm stands.
-        robot: The arm.
-        name: What it is called.
-    """
-
-    def place(scene: Scene) -> Floats:
-        base, tip = scene.base(robot)[:2], scene.tcp(robot)[0][:2]
-        return np.array([*(base + NEARER * (tip - base)), UP])
-
-    return reaching(task, robot, name, place, near=0.1)
 
 
 def push(
@@ -71,7 +52,7 @@ def push(
         after: Waypoints of other arms that come before.
     """
     go = partial(reaching, task, robot, leans=PUSHING, as_it_is=False, gripper=CLOSED)
-    line: list[Floats] = []  # where it aims, and how far from that the block is to lie (m)
+    line: list[Floats] = []  # where it aims
 
     def aim(scene: Scene) -> tuple[Floats, Floats]:
         """Return where the push aims, and the way from there to the block, of length 1."""
