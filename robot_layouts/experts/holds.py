@@ -58,12 +58,6 @@ class Hold:
         pads = hand.opened_from(self.shut, self.grasp.opening, wide)
         return replace(self, pads=pads, share=hand.motion.share(wide))
 
-    def aside(self, distance: float) -> Hold:
-        """Return it with the gripper moved along its x axis, along what it holds (m)."""
-        own = self.own.copy()
-        own[:3, 3] += distance * own[:3, 0]
-        return replace(self, own=own)
-
     def drawn_back(self, distance: float) -> Hold:
         """Return it with the fingers' tips nearer to the thing by a distance (m)."""
         own = self.own.copy()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import combinations, islice, product
+from itertools import chain, combinations, islice, product
 from math import ceil, pi, radians
 
 import numpy as np
@@ -21,9 +21,7 @@ from robot_layouts.experts.script import Pose, Scene, Waypoint
 from robot_layouts.experts.skills import (
     BACK,
     DRAWN,
-    LEANING,
     LEG,
-    LEVER,
     NEAR,
     PASSING,
     UP,
@@ -55,14 +53,10 @@ APART, OPPOSED = 0.02, 0.4  # m between hands, or cosine between their approache
 WIDER = 0.024  # m between each pad and a thing, for hands that hold it crosswise
 BACKWARD = -0.3  # cosine between the taker's approach and its way to the thing, at least
 PITCHES = (0.0, pi, *(k * pi / 4 for k in (1, -1, 2, -2, 3, -3)))  # rad; sides to take from
-# How the giver's hand is pitched (rad), and the taker's moved along the thing (m), in this order.
-MANNERS = (
-    ((0.0,), (0.0,)),
-    ((pi / 4, -pi / 4), (0.0,)),
-    ((0.0, pi / 4, -pi / 4), (0.012, -0.012)),
-)
+LEANT = ((0.0,), (pi / 4, -pi / 4))  # rad; by which the giver's hand is pitched, in this order
 TIGHT, DEEPEST = 1.5e-3, 5e-3  # m; by which fingers are closed too far, and so deep at most then
-PICKS, GIVES, TAKES, MEETINGS, EACH = 4, 16, 960, 120, 6  # of each that go on
+OFFERED, PICKS, GIVES, TAKES = 12, 4, 16, 960  # of each that go on
+MEETINGS, EACH, CLOSELY = 120, 6, 24  # likewise
 OFF = 4.0  # rad of way that a gripper is worth which is turned as it should be, by 1 rad
 CLOSER = 0.006  # m that a hand may come nearer to the other than it should
 PALM, TOUCHING = 0.1, 1e-3  # m from fingers to palm; between places that count as one
@@ -322,6 +316,7 @@ class _Passing:
         self._lean, self._scale = lean, min(giver.length, taker.length) / REFERENCE
         self._meeting: _Rendezvous | None = None
         self._takes: list[Hold] | None = None
+        self._off = CLOSER
         fingers = task.layout.arm(taker.arm).robot.fingers
         assert fingers is not None  # or `Hand` had said so
         self._fingers = fingers.links
@@ -346,40 +341,50 @@ class _Passing:
             StuckError: If there is none; says why.
         """
         reasons = [StuckError(f"no grasp of {self._body} is left for {self.taker.arm!r}")]
-        for pitches, asides in MANNERS:
-            self._takes = self._free_takes(scene, asides)
-            for alike in self._gives(scene, pitches)[:PICKS]:
-                try:
-                    hold, posture = self._taken(scene, alike)
-                    in_hand = hold.shut @ inverse_pose(hold.own)
-                    self._meeting = self._meet(scene, posture, in_hand, hold)
-                except StuckError as error:
-                    reasons.append(error)
-                else:
-                    return hold, posture
+        offered = (self._offered(scene, some, reasons) for some in LEANT)
+        for hold, posture in chain.from_iterable(offered):
+            try:
+                in_hand = hold.shut @ inverse_pose(hold.own)
+                self._meeting = self._meet(scene, posture, in_hand, hold)
+            except StuckError as error:
+                reasons.append(error)
+            else:
+                return hold, posture
         raise reasons[:2][-1]
 
-    def _taken(self, scene: Scene, some: Sequence[Hold]) -> tuple[Hold, Floats]:
-        """Return the best of some grasps of the giver; see `taken`."""
-        up = LIFT * self._scale
-        return taken(self._task, self.giver, scene, self._givers, some, back=BACK, up=up)[0]
+    def _offered(
+        self, scene: Scene, pitches: Sequence[float], reasons: list[StuckError]
+    ) -> list[tuple[Hold, Floats]]:
+        """Return unlike grasps of the giver that leave one to the taker, and postures, best first.
 
-    def _gives(self, scene: Scene, pitches: Sequence[float]) -> list[list[Hold]]:
-        """Return the giver's grasps that leave one to the taker, alike ones together; best first.
-
-        Those come first that are steep, near the centre of mass, and far from what they leave.
+        Args:
+            scene: As it is now.
+            pitches: By which its hand may be pitched (rad).
+            reasons: Why there are none is added.
         """
-        takes = np.array([hold.own for hold in self._takes or ()]).reshape(-1, 4, 4)
-        groups: dict[tuple[int, ...], list[tuple[float, Hold]]] = {}
-        for own, angle in product(self._givers.each, pitches):
-            hold = own.opened(self.giver, AJAR).pitched(angle)
-            down = -float(hold.at(scene)[2, 2])
-            left = float(_costs(hold.own, takes).min(initial=np.inf))
-            if down >= np.cos(self._lean) - 1e-6 and left < np.inf:
-                cost = LEANING * (1 - down) + LEVER * self._givers.lever(own) + left
-                groups.setdefault(_alike(hold), []).append((cost, hold))
-        each = [sorted(group, key=lambda one: one[0]) for group in groups.values()]
-        return [[hold for _, hold in group] for group in sorted(each, key=lambda one: one[0][0])]
+        takes = np.array([hold.own for hold in self._free_takes(scene)]).reshape(-1, 4, 4)
+        gives = (
+            hold.opened(self.giver, AJAR).pitched(angle)
+            for hold, angle in product(self._givers.each, pitches)
+        )
+        some = [
+            hold
+            for hold in gives
+            if -hold.at(scene)[2, 2] >= np.cos(self._lean) - 1e-6
+            and np.isfinite(_costs(hold.own, takes)).any()
+        ]
+        if not some:
+            return []
+        hand, up = self.giver, LIFT * self._scale
+        try:
+            offered = taken(
+                self._task, hand, scene, self._givers, some, back=BACK, up=up, count=OFFERED
+            )
+        except StuckError as error:
+            reasons.append(error)
+            return []
+        unlike = {_alike(hold): (hold, posture) for hold, posture in reversed(offered)}
+        return [*unlike.values()][::-1][:PICKS]
 
     def present(self, scene: Scene, held: bool) -> list[Floats]:
         """Return the giver's posture where it gives the thing."""
@@ -389,11 +394,12 @@ class _Passing:
             self._meeting = self._meet(scene, now, in_hand, None)
         assert self._meeting is not None
         start, frame = hand.like(scene, self._meeting.give), hand.held(scene, self._body)
-        return near_posture(hand, frame, self._meeting.body, start, loose=True)
+        return nearest_posture(hand, frame, self._meeting.body, start)
 
     def take(self, scene: Scene) -> tuple[Hold, Floats]:
         """Return the taker's grasp of the thing as it is held out now, and its posture there."""
         assert self._meeting is not None
+        self._off = CLOSER / 2  # less than was planned with, as hands are where they are by now
         now, body = self.giver.qpos(scene), pose_matrix(*scene.body(self._body))
         grip = self.giver.link(now[None])[0] @ self._meeting.grip
         _, hold, posture = self._take(
@@ -459,9 +465,7 @@ class _Passing:
         """
         giver, taker, name = self.giver, self.taker, self._body
         now = taker.qpos(scene)
-        if self._takes is None:
-            self._takes = self._free_takes(scene, (0.0, *MANNERS[-1][1]))
-        holds = self._takes
+        holds = self._free_takes(scene)
         rows = [
             each
             for row, body in enumerate(bodies)
@@ -482,7 +486,10 @@ class _Passing:
             raise StuckError(f"{taker.arm!r} cannot reach {name} where {giver.arm!r} can give it")
         look = Look(self._task, scene, [name], {taker.owner: now})
         without = Look(self._task, scene, [], {taker.owner: now}, carried=name)
+        closely = 0
         for row, own, posture in islice(_spread(found), MEETINGS):
+            if closely >= CLOSELY:
+                break
             body = bodies[row]
             moved = {name: (body[:3, 3], quaternion_of(body[:3, :3]))}
             gives_it = gives[row], giver.opened(gives[row], released)
@@ -492,11 +499,12 @@ class _Passing:
                 hands = (self._both(give, take) for give in gives_it for take in (at, shut))
                 if without.overlap(hands) is not None:
                     continue
+                closely += 1
                 way = self._on_the_way(scene, hold, body @ hold.own, grips[row], at)
-                off = taker.opened(way[2:], closed)
+                off = [*way[2:], *taker.opened(way[2:], closed)]
                 if (
                     len(way)
-                    and look.overlap((self._both(gives[row], q) for q in way), moved) is None
+                    and look.overlap((self._both(gives[row], q) for q in way[:2]), moved) is None
                     and without.overlap(self._both(gives[row], q) for q in off) is None
                 ):
                     return row, hold, at
@@ -507,25 +515,26 @@ class _Passing:
     def _on_the_way(
         self, scene: Scene, hold: Hold, pose: Floats, grip: Floats, posture: Floats
     ) -> Floats:
-        """Return postures of the taker before it holds the thing, (6, dof) (rad, m).
+        """Return postures of the taker before it holds the thing, (n, dof) (rad, m).
 
-        They are one before the thing, one halfway to there, and four that are a little off: nearer
-        to the other's fingers and palm, and where the fingers part. If one is out of reach, the
-        array is empty.
+        They are one before the thing, one halfway to there, and those in reach that are a little
+        off: nearer to the other's fingers and palm, where the fingers part, and too far ahead,
+        since arms overshoot. If the first is out of reach, there is none.
         """
         taker, now = self.taker, self.taker.opened(self.taker.qpos(scene), hold.share)
         fingers = (grip - pose)[:3, 3]
         palm = fingers - PALM * (grip - pose)[:3, 2]
         nearer = [way / max(float(np.linalg.norm(way)), TOUCHING) for way in (fingers, palm)]
-        off = CLOSER * np.array([*nearer, pose[:3, 1], -pose[:3, 1]])
+        off = self._off * np.array([*nearer, pose[:3, 1], -pose[:3, 1], 2 * pose[:3, 2]])
         found: list[Floats] = []
         for way in (-BACK * pose[:3, 2], *off):
-            joints = near_posture(taker, hold.pads, shifted(pose, way), posture)
-            if not joints:
-                return np.empty((0, len(now)))
-            found.append(posture.copy())
-            found[-1][taker.columns] = joints[0]
-        return np.array([found[0], (now + found[0]) / 2, *found[1:]])
+            if joints := near_posture(taker, hold.pads, shifted(pose, way), posture):
+                found.append(posture.copy())
+                found[-1][taker.columns] = joints[0]
+            elif not found:
+                break
+        halfway = [(now + found[0]) / 2] if found else []
+        return np.array([*found[:1], *halfway, *found[1:]]).reshape(-1, len(now))
 
     def _places(self) -> Iterator[tuple[Floats, Floats]]:
         """Yield where and how turned the giver may hold the thing out."""
@@ -576,16 +585,16 @@ class _Passing:
                     cost, row, hold, _ = alike[which]
                     yield cost, row, hold, qpos, float(off)
 
-    def _free_takes(self, scene: Scene, asides: Sequence[float]) -> list[Hold]:
+    def _free_takes(self, scene: Scene) -> list[Hold]:
         """Return the taker's grasps, from all sides, in which its hand has the thing to itself."""
-        narrow = [hold.opened(self.taker, AJAR) for hold in self.takers.each]
-        found: list[Hold] = []
-        for hold, angle, aside in product(narrow, PITCHES, asides):
-            moved = hold.pitched(angle).aside(aside)
-            free = (each for each in map(moved.drawn_back, DRAWN) if self._closes_on(scene, each))
-            if (first := next(free, None)) is not None:
-                found += [first, *[*free][-1:]]
-        return found
+        if self._takes is None:
+            self._takes = []
+            for hold, angle in product(self.takers.each, PITCHES):
+                pitched = hold.opened(self.taker, AJAR).pitched(angle)
+                drawn = map(pitched.drawn_back, DRAWN)
+                free = (each for each in drawn if self._closes_on(scene, each))
+                self._takes += islice(free, 1)
+        return self._takes
 
     def _closes_on(self, scene: Scene, hold: Hold) -> bool:
         """Return whether the taker's hand is outside the thing, and closes on it alone."""
@@ -607,8 +616,8 @@ class _Passing:
         found: dict[str, float] = {}
         for one, other, depth in room.overlaps(scene, {hand.owner: now}, moved):
             ends = {one.name, other.name}
-            if self._body in ends and (link := (ends & hand.links)):
-                found.setdefault(*link, depth)
+            for link in ends & hand.links if self._body in ends else ():
+                found.setdefault(link, depth)
         return found
 
     def _both(self, give: Floats, take: Floats) -> dict[str, Floats]:
