@@ -26,7 +26,7 @@ _SAMPLES = 20_000  # random joint positions per arm
 _LEAST_DOWN = 0.3  # cosine between a gripper's approach and straight down
 _CELL = 0.05  # of the shorter reach: edge of the cells that places are counted in
 HEIGHT = 0.35  # of the shorter reach: how high above the ground places are looked for
-_DEEP = 0.5  # of the depth of the deepest place, that is deep enough
+_DEEP = 0.8  # of the depth of the deepest place, that is deep enough
 _OFTEN = 3  # samples in a cell and its neighbours that show it to be well within reach
 
 
@@ -39,7 +39,7 @@ def shared_place(
 ) -> tuple[tuple[float, float], float] | None:
     """Return the place on the ground that lies deepest within reach of all arms, and how deep (m).
 
-    Or of the places that lie at least half as deep the one that is nearest to another.
+    Or of the places that lie nearly as deep the one that is nearest to another.
 
     An arm reaches a place if random postures often bring its TCP there, near the ground and with
     the gripper pointing down more than it does aside. Of an arm on a body only postures count in

@@ -221,7 +221,7 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
         scores = ", ".join(f"{name} {score:g}" for name, score in cls.stages.items())
         rows.add_row("stages", scores)
     yield rows
-    if cls.fits_robots:
+    if cls.fits():
         yield f"\nFits its robots: {fit_text(env)}"
     yield f"\nLayout: {env.layout}\n"
     yield action_sentence(env.layout)

@@ -354,7 +354,7 @@ def _replace_robots(
     if isinstance(robots, Mapping):
         if cls.robot_counts is None:
             _refuse_bodies(cls, robots)
-        if cls.fits_robots and robots:
+        if cls.fits() and robots:
             return at_task(robots, layout)
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         return Layout({**layout, **changed}, layout.frames)

@@ -57,6 +57,14 @@ class Fit:
         c, s = cos(self.yaw), sin(self.yaw)
         return (self.x + c * x - s * y, self.y + s * x + c * y, z)
 
+    def declared(self, place: Vector3) -> Vector3:
+        """Return where a place of the world, (m), is in the declaration (m)."""
+        if self.as_declared:
+            return place
+        x, y, z = place[0] - self.x, place[1] - self.y, place[2]
+        c, s = cos(self.yaw), sin(self.yaw)
+        return ((c * x + s * y) / self.scale, (c * y - s * x) / self.scale, z / self.scale)
+
     def turned(self, declared: Quaternion) -> Quaternion:
         """Return a declared orientation as it is here, wxyz."""
         if self.as_declared:

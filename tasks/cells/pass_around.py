@@ -42,7 +42,6 @@ class CellPassAround(CellTask):
         {"first": "panda", "second": "panda_wristcam", "third": "panda", "fourth": "panda"},
         radius=0.95,
     )
-    fits_robots = False  # zones lie between its arms, wherever these stand
     robot_counts = range(3, 9)
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}
     max_episode_steps = 700

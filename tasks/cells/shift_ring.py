@@ -47,7 +47,6 @@ class CellShiftRing(CellTask):
     layout = ring(
         dict.fromkeys(("first", "second", "third", "fourth", "fifth", "sixth"), "panda"), radius=1.0
     )
-    fits_robots = False  # zones lie between its arms, wherever these stand
     robot_counts = range(3, 9)
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}
     max_episode_steps = 300

@@ -58,14 +58,14 @@ class CellTask(MultiRobotTask):
         return OF_STAGES * info["stage_score"] + (1.0 - OF_STAGES) * mean
 
     def before(self, arm: str, out: float, aside: float = 0.0) -> tuple[float, float]:
-        """Return a place before an arm of a ring, x and y (m, world).
+        """Return a place before an arm of a ring, x and y (m, as declared).
 
         Args:
             arm: The arm.
             out: How far the place is from the origin towards the arm's base (m).
             aside: How far it is from that line, to the right of who looks along it (m).
         """
-        x, y, _ = self.layout.arm(arm).base_position
+        x, y, _ = self.fit.declared(self.layout.arm(arm).base_position)
         x, y = x / hypot(x, y), y / hypot(x, y)
         return out * x + aside * y, out * y - aside * x
 

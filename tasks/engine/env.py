@@ -136,7 +136,7 @@ class TaskEnv(Remade):
         self.task = task = object.__new__(task_class)
         self.scenario = task.scenario = scenario
         self.layout = task.layout = layout
-        if task_class.fits_robots:
+        if task_class.fits():
             vars(task).update(fitted(task_class, layout))
         mode = scenario.layout.control_mode(scenario.control_mode)
         self.control_mode = task.control_mode = mode

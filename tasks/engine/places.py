@@ -30,7 +30,7 @@ def built_layout(task_class: type[Task], scenario: Scenario) -> Layout:
     name, given, places = task_class.__name__, scenario.layout, task_class.layout.places
     counts, needs = task_class.robot_counts, task_class.needs
     check_places(name, given, places, counts, scenario.bystanders)
-    if task_class.fits_robots:
+    if task_class.fits():
         needs = {place: replace(need, opening=None) for place, need in needs.items()}
     check_needs(name, given, given.places if counts else places, needs)
     still = _settled(given, places, counts, scenario.bystanders)

@@ -91,7 +91,8 @@ class Task:
         fits_robots: Whether its places and sizes fit the robots that it is made with; they are
             declared in numbers for those of ``layout``. `build` and `sample` are then given worlds,
             and `evaluate`, `dense_reward` and `remember` states, in the frame and the lengths of
-            the declaration; `observe` and all others see the world as it is.
+            the declaration; `observe` and all others see the world as it is. A task over any number
+            of robots goes by its layout instead.
         fit: In methods, how they do: `tasks.Fit`.
         physics: Solver settings; None keeps SAPIEN's own defaults.
         randomization: What varies from episode to episode; None for nothing.
@@ -166,6 +167,11 @@ class Task:
         if "reward_modes" not in cls.__dict__:
             dense = cls.dense_reward is not Task.dense_reward
             cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
+
+    @classmethod
+    def fits(cls) -> bool:
+        """Return whether it fits its robots: it says so, and has places of its own to go by."""
+        return cls.fits_robots and cls.robot_counts is None
 
     @classmethod
     def setting(cls, name: str) -> Randomization | None:

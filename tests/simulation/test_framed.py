@@ -97,6 +97,18 @@ def test_what_varies_in_size_too_stands_on_the_table():
     assert env.state.position("can")[0, 2] == pytest.approx(size * can.height, abs=1e-5)
 
 
+def test_where_arms_stand_is_declared_too():
+    cls = tasks.get_task_class("CellSetFaders-v1")
+    turned = at_task("so101", cls).moved((0.5, 0.1, 0.0), yaw=1.0)
+    env = tasks.make("CellSetFaders-v1", layout=turned)
+    for arm, own in cls.layout.items():
+        x, y, z = own.base_position
+        assert env.task.before(arm, 1.0) == pytest.approx(
+            (x / np.hypot(x, y), y / np.hypot(x, y)), abs=2e-3
+        )
+        assert FIT.declared(FIT.place((x, y, z))) == pytest.approx((x, y, z))
+
+
 def test_success_is_judged_in_declared_lengths():
     env = tasks.make("CellSortCubes-v1", robots=dict.fromkeys(NEAREST, "so101"))
     world = FramedWorld(env.simulation.worlds[0], env.task.fit)

@@ -10,9 +10,12 @@ import pytest
 import layouts
 import tasks
 from tasks import CellTask
+from tasks.language.fitting import AS_DECLARED
 
 ARMS = ("first", "second", "third")
-RING: Any = SimpleNamespace(layout=layouts.ring(dict.fromkeys(ARMS, "panda"), radius=0.8))
+RING: Any = SimpleNamespace(
+    layout=layouts.ring(dict.fromkeys(ARMS, "panda"), radius=0.8), fit=AS_DECLARED
+)
 
 
 @pytest.mark.parametrize("arm", ARMS)
