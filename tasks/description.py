@@ -27,6 +27,7 @@ from tasks.registry import full_name, get_task_class, make, origin, other_names
 # Written by ``python -m parity compare --all --record``; in a checkout and in the wheel.
 PARITY_RESULTS = Path(__file__).with_name("parity.json")
 UNKNOWN = "–"
+LONG = 42  # letters
 OURS = "robot-layouts"  # where built-in tasks come from
 
 _SUCCESS = "Success:"
@@ -108,9 +109,10 @@ def declared_facts(task_id: str, observation_size: int | None = None) -> TaskFac
 
 
 def robots_text(layout: Layout) -> str:
-    """Return a layout's robots in words, in order: ``2 × panda_wristcam``."""
+    """Return a layout's robots in words, in order: ``2 × panda_wristcam``; how many, if long."""
     counts = Counter(placement.robot.name for placement in layout.values())
-    return " + ".join(f"{n} × {name}" if n > 1 else name for name, n in counts.items())
+    words = " + ".join(f"{n} × {name}" if n > 1 else name for name, n in counts.items())
+    return words if len(words) <= LONG else f"{len(layout)} robots of {len(counts)} kinds"
 
 
 def parity_verdicts(path: Path = PARITY_RESULTS) -> dict[str, str]:

@@ -14,7 +14,7 @@ from torch import Tensor
 
 from robot_layouts.core.processes.start import preload
 from robot_layouts.simulation import Simulation, State, World
-from robot_layouts.simulation.framed import FramedState, FramedWorld
+from robot_layouts.simulation.framed import Fit, FramedState, FramedWorld
 from robot_layouts.simulation.maths import Array, Floats, all_finite
 from robot_layouts.simulation.scene.parts import Part
 from robots import SimulationError, TaskError
@@ -138,6 +138,7 @@ class TaskEnv(Remade):
         self.layout = task.layout = layout
         if task_class.fits():
             vars(task).update(fitted(task_class, layout))
+        self._fit = None if task.fit.as_declared else task.fit
         mode = scenario.layout.control_mode(scenario.control_mode)
         self.control_mode = task.control_mode = mode
         self.num_envs = task.num_envs = scenario.num_envs
@@ -476,15 +477,13 @@ class TaskEnv(Remade):
 
     def _framed(self, world: World) -> World:
         """Return a world as the task declares what is in it."""
-        return world if self.task.fit.as_declared else FramedWorld(world, self.task.fit)
+        return world if self._fit is None else FramedWorld(world, self._fit)
 
-    def _declared(self, state: State) -> State:
+    def _declared(self, state: State, fit: Fit) -> State:
         """Return a state as the task declares what is in it."""
-        if self.task.fit.as_declared:
-            return state
         if (seen := state.memo.get(FramedState)) is None:
             bodies = self.simulation.worlds[0].bodies
-            seen = state.memo[FramedState] = FramedState(state, self.task.fit, bodies)
+            seen = state.memo[FramedState] = FramedState(state, fit, bodies)
         return seen
 
     def _fill(self, world: World) -> None:
@@ -520,7 +519,8 @@ class TaskEnv(Remade):
         self.simulation.hold(state)
         if self._randomizer is not None:
             self._randomizer.rest(self.simulation, state, ids)
-        task.memory.renew(self._remembered.checked(task.remember(self._declared(state))), ids)
+        own = state if self._fit is None else self._declared(state, self._fit)
+        task.memory.renew(self._remembered.checked(task.remember(own)), ids)
         expect_nothing(task, "begin_episodes", task.begin_episodes(state, ids))
         info = self._info(state)
         check_info(self.task_class.__name__, info)
@@ -553,7 +553,8 @@ class TaskEnv(Remade):
         return state
 
     def _info(self, state: State) -> Info:
-        judged = self._judged.checked(self.task.evaluate(self._declared(state)))
+        own = state if self._fit is None else self._declared(state, self._fit)
+        judged = self._judged.checked(self.task.evaluate(own))
         info: Info = {ELAPSED: self._elapsed.copy(), **judged}
         if (modes := self.simulation.modes) is not None:
             info |= {f"{arm}.shortfall": rows.copy() for arm, rows in modes.shortfalls.items()}
@@ -601,15 +602,12 @@ class TaskEnv(Remade):
                 return np.zeros(self.num_envs, np.float32)
 
     def _dense(self, state: State, action: Floats, info: Info) -> Floats:
+        own = state if self._fit is None else self._declared(state, self._fit)
         if self._rewards.dtype is None:  # the first
             with unchanged(state, f"{self.task_class.__name__}.dense_reward()"):
-                reward = self._rewards.checked(
-                    self.task.dense_reward(self._declared(state), action, info)
-                )
+                reward = self._rewards.checked(self.task.dense_reward(own, action, info))
         else:
-            reward = self._rewards.checked(
-                self.task.dense_reward(self._declared(state), action, info)
-            )
+            reward = self._rewards.checked(self.task.dense_reward(own, action, info))
         if not all_finite(reward):
             refuse_reward(reward, self.task, self._elapsed)
         return reward

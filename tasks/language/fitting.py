@@ -57,7 +57,8 @@ def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | Non
     turn = _turn(own, arms)
     (x, y), room = _middle(own, arms, turn), inf
     if len(arms) <= 2:  # more of them need not all reach it
-        if (shared := shared_place(layout, tuple(declared.places), table, near=(x, y))) is None:
+        near = (x, y) if len(layout) == len(arms) else None  # limbs reach where their body has them
+        if (shared := shared_place(layout, tuple(declared.places), table, near=near)) is None:
             robots = {place: layout.arm(place).robot.name for place in declared.places}
             names = ", ".join(f"{place!r} ({robot})" for place, robot in robots.items())
             raise TaskError(

@@ -74,7 +74,8 @@ def test_list_has_a_row_for_every_task(capsys, only_pick_cube_recorded):
 def test_describe_accounts_for_every_number(task_id, capsys):
     cls, about = tasks.get_task_class(task_id), facts(task_id)
     lines = [line.split() for line in run(capsys, "describe", task_id).splitlines()]
-    numbers = [line for line in lines if len(line) > 4 and line[1] in cls.layout]
+    rows = [line for line in lines if len(line) > 4 and line[0].isdigit()]
+    numbers = [row for row in rows if row[1] in cls.layout]
     layout, actions = numbers[: len(cls.layout)], numbers[len(cls.layout) :]
     assert [line[1] for line in layout] == list(cls.layout)
     assert [line[0] for line in actions] == [str(i) for i in range(about.action_size)]

@@ -18,7 +18,6 @@ from robot_layouts.experts.script import Scene
 from robots import DescriptorError, TaskError, UnknownNameError
 from tasks import Area, Fixed, MultiRobotTask, Object, Randomization, register_task
 from tasks.episode import play
-from tasks.language.fitting import Fit
 from tasks.view import recorded_motion, task_cell
 
 ID = "TestOpenUp-v1"
@@ -137,8 +136,6 @@ def test_a_larger_thing_begins_as_far_open_and_its_parts_have_no_size_of_their_o
     plain.reset(seed=0)
     opened = [task.state.joint("case", "drawer")[0] for task in (env, plain)]
     assert opened[0] == pytest.approx(1.5 * opened[1], rel=1e-6)
-    half = Object("drawer", scale=0.5, joints={"drawer": 0.16})  # m, of the usual one
-    assert half.fitted(Fit(scale=2.0)).scale == 1.0
     with pytest.raises(UnknownNameError, match="case.drawer"):
         tasks.make(ID, randomization=Randomization(size={"case.drawer": Fixed(1.5)}))
 

@@ -26,7 +26,6 @@ from tasks import (
     register_task,
 )
 from tasks.episode import play
-from tasks.language.fitting import Fit
 from tasks.view import body_parts
 
 ID = "TestSetTheTable-v1"
@@ -115,9 +114,6 @@ def test_a_thing_may_be_a_descriptor_and_larger():
     assert Object(mug).shapes == mug.parts
     large = Object("mug", scale=1.5)
     assert large.descriptor.sizes["height"] == pytest.approx(1.5 * mug.sizes["height"])
-    assert large.fitted(Fit(scale=2.0)).descriptor.sizes["height"] == pytest.approx(
-        3 * mug.sizes["height"]
-    )
 
 
 def test_add_object_puts_it_down_as_it_rests():
