@@ -7,7 +7,7 @@ a `Fit` maps to the world's.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import cos, sin
 from typing import Any
@@ -100,15 +100,13 @@ class FramedWorld(World):
         **more: Any,
     ) -> WorldBody:
         """Add a body, as much larger as the frame is; see `World.add`."""
-        *_, x, y, z = self._pose(name, position, quaternion)[:3]
+        x, y, z, *_ = self._pose(name, position, quaternion)
         place, turn = self._fit.place((x, y, z)), self._fit.turned(quaternion)
         return super().add(name, *shapes, position=place, quaternion=turn, **more)
 
-    def set_poses(self, names: Iterable[str], position: Any, quaternion: Any = IDENTITY) -> None:
-        """Move several bodies to the same pose of the frame; see `World.set_poses`."""
-        x, y, z, *turn = self._pose(str(names), position, quaternion)
-        turned = self._fit.turned((turn[0], turn[1], turn[2], turn[3]))
-        super().set_poses(names, self._fit.place((x, y, z)), turned)
+    def _in_world(self, pose: list[float]) -> list[float]:
+        x, y, z, w, i, j, k = pose
+        return [*self._fit.place((x, y, z)), *self._fit.turned((w, i, j, k))]
 
 
 class FramedState(State):

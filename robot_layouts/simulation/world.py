@@ -229,7 +229,7 @@ class World:
         if isinstance(names, str):
             raise SimulationError(f"set_poses takes several names; set_pose takes one, {names!r}")
         names = list(names)
-        pose = self._pose(", ".join(map(str, names)), position, quaternion)
+        pose = self._in_world(self._pose(", ".join(map(str, names)), position, quaternion))
         rows = self._placements.bodies
         for name in names:
             if (owner := self.body(name).part_of) is not None:
@@ -293,6 +293,10 @@ class World:
         what = f"quaternion of body {body!r} in environment {self._number}"
         expect_unit(what, turn, SimulationError)
         return [*place, *turn]
+
+    def _in_world(self, pose: list[float]) -> list[float]:
+        """Return a pose that was given, position (m) and quaternion (wxyz), in the world."""
+        return pose
 
     def _floats(self, values: Any, count: int, what: str, unit: str) -> list[float]:
         try:

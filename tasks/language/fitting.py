@@ -55,9 +55,10 @@ def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | Non
     if held:
         scale = min([scale, *(_holds(arm.robot) / held for arm in arms if _opening(arm.robot))])
     turn = _turn(own, arms)
-    (x, y), room = _middle(own, arms, turn), inf
+    (x, y), room = _origin(own, arms, turn, scale), inf
     if len(arms) <= 2:  # more of them need not all reach it
-        near = (x, y) if len(layout) == len(arms) else None  # limbs reach where their body has them
+        bodies = {layout.owner(place) for place in declared.places}
+        near = (x, y) if len(bodies) == len(arms) else None  # limbs reach where their body has them
         if (shared := shared_place(layout, tuple(declared.places), table, near=near)) is None:
             robots = {place: layout.arm(place).robot.name for place in declared.places}
             names = ", ".join(f"{place!r} ({robot})" for place, robot in robots.items())
@@ -78,13 +79,19 @@ def _turn(own: Sequence[Placement], arms: Sequence[Placement]) -> float:
     return round(float(np.angle(np.sum(np.conj(before) * after))), _DIGITS) + 0.0
 
 
-def _middle(
-    own: Sequence[Placement], arms: Sequence[Placement], turn: float
+def _origin(
+    own: Sequence[Placement], arms: Sequence[Placement], turn: float, scale: float
 ) -> tuple[float, float]:
-    """Return the place from which arms are as much farther than a task's own as is usual (m)."""
+    """Return where the origin of a declaration is by where arms stand (m).
+
+    They stand about the middle of the task's own as much farther as is usual, and what is declared
+    there stays there.
+    """
     factors = farther([arm.robot for arm in arms], [arm.robot for arm in own])
-    x = np.mean(_flat(arms) - np.array(factors) * np.exp(1j * turn) * _flat(own))
-    return round(float(x.real), _DIGITS) + 0.0, round(float(x.imag), _DIGITS) + 0.0
+    declared = np.mean(_flat(own))
+    middle = np.mean(_flat(arms) - np.array(factors) * np.exp(1j * turn) * (_flat(own) - declared))
+    at = middle - scale * np.exp(1j * turn) * declared
+    return round(float(at.real), _DIGITS) + 0.0, round(float(at.imag), _DIGITS) + 0.0
 
 
 def _flat(bases: Sequence[Placement]) -> NDArray[np.complex128]:

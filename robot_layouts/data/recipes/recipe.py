@@ -29,6 +29,7 @@ from robot_layouts.data.suite.suite import (
     file_below,
     read_layout,
     read_randomization,
+    read_robots,
     read_seeds,
     write_seeds,
     written_layout,
@@ -163,6 +164,8 @@ def _making(about: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     how = {key: _whole(key, about[key]) for key in _MAKING if key in about}
     if "observations" in how:
         how["observations"] = str(how["observations"]).lower() == "true"  # YAML's words are texts
+    if "robots" in how:
+        how["robots"] = read_robots(how["robots"], folder)
     if "layout" in how:
         how["layout"] = read_layout(how["layout"], folder)
     if how.get("randomization") not in (None, *SETTINGS):

@@ -418,6 +418,21 @@ def read_layout(value: Any, folder: Path) -> Layout | None:
     raise LayoutError(f"a layout is {shown(value)}; it takes {_HOW}")
 
 
+def read_robots(value: Any, folder: Path) -> Any:
+    """Return the robots that a file names, by place or one for all; what is no word stays.
+
+    Raises:
+        RobotLayoutsError: See `robots.named.robot_in_file`.
+    """
+    if isinstance(value, Mapping):
+        return {place: _robot(robot, str(place), folder) for place, robot in value.items()}
+    return _robot(value, "every place", folder)
+
+
+def _robot(word: Any, place: str, folder: Path) -> Any:
+    return robot_in_file(word, place, folder) if isinstance(word, str) else word
+
+
 def written_layout(layout: Layout, folder: Path) -> dict[str, Any]:
     """Return a layout written out, as `read_layout` reads it from a file in a folder.
 
@@ -477,11 +492,8 @@ def _preset(value: Mapping[str, Any], folder: Path) -> Layout:
         for key, given in value.items()
         if key != "preset"
     }
-    if isinstance(robots := options.get("robots"), Mapping):
-        options["robots"] = {
-            place: robot_in_file(robot, place, folder) if isinstance(robot, str) else robot
-            for place, robot in robots.items()
-        }
+    if "robots" in options:
+        options["robots"] = read_robots(options["robots"], folder)
     place = PRESETS[preset]
     takes = signature(place).parameters
     for name in options:

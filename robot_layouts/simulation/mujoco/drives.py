@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from layouts import Layout
+from robot_layouts.simulation.linkage import Leaders
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.mujoco.model import Inventory
 from robot_layouts.simulation.mujoco.world import MujocoWorld
@@ -14,17 +15,12 @@ from robots import JointGroup
 
 
 class LedGroup:
-    """JointDrives a joint group with leaders; see `robots.JointGroup`.
-
-    Leaders are driven at most their lead ahead of their mean place, which bounds the force, and
-    the others to where the leaders are and as fast, so that jaws which hold something stay
-    parallel.
-    """
+    """The drives of a joint group with leaders; see `robot_layouts.simulation.linkage`."""
 
     def __init__(self, group: JointGroup, first: int) -> None:
         """Take a group, and where its first joint stands among all that are driven."""
         self.places = slice(first, first + len(group.joints))
-        self._lead = group.lead
+        self._leaders = Leaders(group)
         self._multipliers, self._offsets = np.array(group.followers, float).T
         self._leads = np.array([joint in group.leaders for joint in group.joints])
 
@@ -36,13 +32,10 @@ class LedGroup:
             qpos: Positions of its joints.
             qvel: Their velocities.
         """
-        leads = self._leads
-        value = float(((qpos - self._offsets) / self._multipliers)[leads].mean())
-        speed = float((qvel / self._multipliers)[leads].mean())
-        goal = (wanted - self._offsets[0]) / self._multipliers[0]
-        ahead = min(max(goal, value - self._lead), value + self._lead)
-        positions = self._multipliers * np.where(leads, ahead, value) + self._offsets
-        return positions, np.where(leads, 0.0, self._multipliers * speed)
+        goal, leads = (wanted - self._offsets[0]) / self._multipliers[0], self._leaders.places
+        ahead, value, speed = self._leaders.moved(goal, qpos[leads], qvel[leads])
+        positions = self._multipliers * np.where(self._leads, ahead, value) + self._offsets
+        return positions, np.where(self._leads, 0.0, self._multipliers * speed)
 
 
 class JointDrives:

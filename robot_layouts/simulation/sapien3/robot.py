@@ -10,27 +10,22 @@ import numpy as np
 import sapien
 
 from layouts import Placement
+from robot_layouts.simulation.linkage import Leaders
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
 from robot_layouts.simulation.speeds import joint_speeds
 from robots import DescriptorError, JointGroup, RobotDescriptor, UnknownNameError
 
 
 class DrivenLinkage:
-    """The drives of a joint group with leaders; see `robots.JointGroup`.
-
-    Each joint's own target would let those that nothing stops go on alone, so that jaws which hold
-    something splay. So before each step of physics leaders are driven at most their lead ahead of
-    their mean place, which bounds the force, and the others to where the leaders are and as fast.
-    """
+    """The drives of a joint group with leaders; see `robot_layouts.simulation.linkage`."""
 
     def __init__(self, group: JointGroup, joints: Sequence[Any], articulation: Any) -> None:
         """Take a group, its joints as SAPIEN has them, and what they are joints of."""
         active = articulation.active_joints
-        self._articulation, self._lead = articulation, group.lead
+        self._articulation, self._leaders = articulation, Leaders(group)
         laws = dict(zip(group.joints, zip(joints, group.followers, strict=True), strict=True))
         leading = [laws[name] for name in group.leaders]
         self._places = [active.index(joint) for joint, _ in leading]
-        self._multipliers, self._offsets = np.array([law for _, law in leading]).T
         self._leading = [(joint.set_drive_target, *law) for joint, law in leading]
         self._others = [
             (joint.set_drive_target, joint.set_drive_velocity_target, *laws[name][1])
@@ -47,9 +42,9 @@ class DrivenLinkage:
     def pull(self) -> None:
         """Set the targets of all joints for the next step of physics."""
         qpos, qvel = self._articulation.qpos, self._articulation.qvel
-        value = float(((qpos[self._places] - self._offsets) / self._multipliers).mean())
-        speed = float((qvel[self._places] / self._multipliers).mean())
-        ahead = min(max(self._wanted, value - self._lead), value + self._lead)
+        ahead, value, speed = self._leaders.moved(
+            self._wanted, qpos[self._places], qvel[self._places]
+        )
         for go, multiplier, offset in self._leading:
             go(multiplier * ahead + offset)
         for go, move, multiplier, offset in self._others:
