@@ -238,6 +238,7 @@ def verify(
     task: Annotated[str, Word("MODULE:ID")] | None = None,
     robots: Sequence[PlacedRobot] = (),
     num_envs: Count = 1,
+    episodes: Count | None = None,
     pictures: Annotated[Path, Word("DIR")] | None = None,
     players: Players,
 ) -> int:
@@ -254,6 +255,7 @@ def verify(
         task: The task, if no installed package lists it.
         robots: Which robots these were, where the receipt cannot say it.
         num_envs: Episodes that play at once.
+        episodes: Play N of them alone, drawn at random (all).
         pictures: Where to write pictures that differ (the folder NAME.differences beside the
             receipt).
         players: Who plays.
@@ -270,7 +272,8 @@ def verify(
     known = chosen_robots(robots) if robots else {}
     if isinstance(known, RobotDescriptor):
         known = dict.fromkeys(read.making["layout"], known)
-    executor, line = players.executor(), Progress(len(read.episodes), "episodes")
+    total = min(len(read.episodes), episodes or len(read.episodes))
+    executor, line = players.executor(), Progress(total, "episodes")
     states = {episode.seed: episode.states for episode in read.episodes}
     equal = Counter[bool]()
 
@@ -283,7 +286,14 @@ def verify(
 
     with stoppable(), line:
         found = verification.verify(
-            read, executor, show, policy=policy, task=task, robots=known, num_envs=num_envs
+            read,
+            executor,
+            show,
+            policy=policy,
+            task=task,
+            robots=known,
+            num_envs=num_envs,
+            episodes=episodes,
         )
     print(printable(repr(found)))
     verdict = "equal: this is" if found.equal else "not equal: this is not"
