@@ -129,6 +129,7 @@ def evaluate(
     receipt: Annotated[Path, Word("JSON")] | None = None,
     picture_interval: Count = 1,
     keep_pictures: bool = False,
+    log: Annotated[str, Word("tensorboard:DIR|wandb:PROJECT")] | None = None,
     acting: Acting,
     cell: CellOptions,
 ) -> None:
@@ -145,6 +146,7 @@ def evaluate(
         receipt: Write a receipt, which `verify` plays again.
         picture_interval: The receipt has a digest of the pictures of each so many-th step.
         keep_pictures: Keep these pictures, in a folder beside the receipt.
+        log: Log each episode as it ends, for TensorBoard or Weights & Biases.
         acting: Who acts, and how.
         cell: The task's robots, and what varies.
 
@@ -153,16 +155,23 @@ def evaluate(
     """
     from robot_layouts.core.progress import Progress
     from robot_layouts.data import evaluation
+    from robot_layouts.data.log import opened_log
 
     executor, line, solved = players.executor(), Progress(episodes, "episodes"), Counter[bool]()
 
-    def show(event: Event) -> None:
-        tell(line, event)
-        if event.result is not None:
-            solved[event.result.success] += 1
-        line.update(solved.total(), f"evaluating (succeeded so far: {solved[True]})")
+    with stoppable(), opened_log(log) as add, line:
 
-    with stoppable(), line:
+        def show(event: Event) -> None:
+            tell(line, event)
+            if (score := event.result) is not None:
+                solved[score.success] += 1
+                success = solved[True] / solved.total()
+                numbers = {"success": success, "return": score.total, "steps": score.steps}
+                if score.stage_score is not None:
+                    numbers["stage_score"] = score.stage_score
+                add(solved.total(), numbers)
+            line.update(solved.total(), f"evaluating (succeeded so far: {solved[True]})")
+
         found = evaluation.evaluate(
             task=task,
             seeds=range(seed, seed + episodes),
