@@ -70,6 +70,7 @@ class Recipe:
         blocks: How many pairs of layers it has.
         batch: Moments in a batch.
         learning_rate: At first, after 200 batches; it falls to 0.
+        simulator: In which it learns.
     """
 
     task: str
@@ -83,12 +84,13 @@ class Recipe:
     blocks: int = 3
     batch: int = 256
     learning_rate: float = 1e-3
+    simulator: str = "sapien3"
     options: ClassVar[tuple[str, ...]] = ()  # fields that the command line sets as well
 
     @property
     def making(self) -> dict[str, Any]:
-        """What is recorded beside states and actions: arguments of `tasks.make`."""
-        return {}
+        """How the task is made that is recorded: arguments of `tasks.make`."""
+        return {"simulator": self.simulator}
 
 
 def shaking(recipe: Recipe) -> Randomization:
@@ -147,7 +149,7 @@ class Observer:
     def __init__(self, recipe: Recipe, senses: Senses) -> None:
         """Make the task as it was recorded."""
         shaken = shaking(recipe)
-        how: dict[str, Any] = {"obs_mode": OBSERVED, "reward_mode": "none"}
+        how: dict[str, Any] = {**recipe.making, "obs_mode": OBSERVED, "reward_mode": "none"}
         self.env = tasks.make(recipe.task, randomization=shaken, **how)
         self._senses, self._arms = senses, list(_arms(self.env.layout))
 
@@ -310,7 +312,7 @@ class ClonedPolicy:
     @property
     def making(self) -> dict[str, Any]:
         """How the task is made that it plays: arguments of `tasks.make`."""
-        return {"control_mode": MODE, "obs_mode": OBSERVED}
+        return {**self.recipe.making, "control_mode": MODE, "obs_mode": OBSERVED}
 
     def sense(self, observation: Mapping[str, Any]) -> Any:
         """Return what the network gets of an observation."""
@@ -493,6 +495,7 @@ def main(
     add("--episodes", type=int, default=usual.episodes, help="to learn from (%(default)s)")
     add("--steps", type=int, default=usual.steps, help="batches to learn from (%(default)s)")
     add("--seed", type=int, default=usual.seed, help="of weights and batches (%(default)s)")
+    add("--simulator", default=usual.simulator, help="in which it learns (%(default)s)")
     add("--examined", type=int, default=25, help="episodes now and then (%(default)s)")
     add("--tests", type=int, default=100, help="test episodes (%(default)s)")
     for field in usual.options:
@@ -504,7 +507,7 @@ def main(
     add("--log", help=f"also log the curve: {HOW}")
     options = parser.parse_args(arguments)
     sys.path.append(os.getcwd())  # for MODULE:ID of the present folder
-    fields = ("task", "episodes", "steps", "seed", *usual.options)
+    fields = ("task", "episodes", "steps", "seed", "simulator", *usual.options)
     recipe = policies.recipes(**{name: getattr(options, name) for name in fields})
     out = options.out or Path("runs") / name / options.task.rpartition(":")[2]
     try:

@@ -56,7 +56,8 @@ class PictureRecipe(Recipe):
     def making(self) -> dict[str, Any]:
         """How the task is made: arguments of `tasks.make`."""
         size = self.size, self.size
-        return {"obs_mode": OBSERVED, "camera_size": size, "visuals": self.visuals}
+        look = {"camera_size": size, "visuals": self.visuals}
+        return {**super().making, "obs_mode": OBSERVED, **look}
 
 
 @dataclass(frozen=True)
