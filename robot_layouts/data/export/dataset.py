@@ -197,6 +197,11 @@ class Export(ExportOptions):
             SimulationError: If there is no Vulkan driver to draw pictures with.
             RecordingError: If the folder holds something already.
         """
+        self.check_options(here=here)
+        refuse_used(Path(self.out))
+
+    def check_options(self, *, here: bool) -> None:
+        """Refuse what cannot be done wherever it is to be written; see `check`."""
         if self.format not in FORMATS:
             raise UnknownNameError("export format", self.format, FORMATS)
         if self.fps is not None and self.fps < 1:
@@ -207,7 +212,6 @@ class Export(ExportOptions):
             self._expect_robomimic()
         self._expect_points()
         self._expect_pictures(here=here)
-        refuse_used(Path(self.out))
 
     def _expect_robomimic(self) -> None:
         for what in ("video", "images", "fps"):
