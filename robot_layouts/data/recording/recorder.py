@@ -319,7 +319,7 @@ def checked_file_size(size: Any) -> float:
     """Return a size at which a further file is begun (MB).
 
     Raises:
-        TaskError: If it is none.
+        TaskError: If it is no such size.
     """
     if not isinstance(size, (int, float)) or not 0 < size < math.inf:
         raise TaskError(f"file_size is {size!r}; it must be MB, more than 0")
