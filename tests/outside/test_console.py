@@ -69,6 +69,7 @@ def test_a_wrong_word_gets_its_closest_match(capsys, words, near):
     assert f"Did you mean {near!r}?" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_files_of_the_user_hide_nothing_from_it(tmp_path):
     folder = make_folder(tmp_path, shadows=True)
     codes, printed = run(folder, "record --help", "tasks describe --help", "robots inspect panda")
