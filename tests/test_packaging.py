@@ -162,6 +162,7 @@ def modules_of(room):
     return sorted((ROOT / room).rglob("*.py"))
 
 
+@functools.cache
 def imports_of(room, *, everywhere):
     """Third-party packages that a room imports: at import time, or also inside functions."""
     found = set()

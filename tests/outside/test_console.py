@@ -137,15 +137,6 @@ class TestNew:
         assert main(["new", "task", "Reach", "--out", str(tmp_path), "--robots", *robots]) == 0
         assert "3 passed" in self.pytest(tmp_path).stdout
 
-    @pytest.mark.long
-    def test_robot_writes_files_that_run(self, tmp_path):
-        from robots import RobotRegistry
-
-        urdf = str(RobotRegistry.load("xarm7").urdf.locate())
-        assert main(["new", "robot", urdf, "--name", "my_arm", "--out", str(tmp_path)]) == 0
-        done = self.pytest(tmp_path)
-        assert "5 passed" in done.stdout, done.stdout + done.stderr
-
     @pytest.mark.parametrize(
         ("name", "robot", "words"),
         [
