@@ -47,6 +47,7 @@ CATALOGUE = {
     "CellSortCubes-v1": "tasks.cells.sort_cubes:CellSortCubes",
     "CellSwapPlaces-v1": "tasks.cells.swap_places:CellSwapPlaces",
     "CellSweepBlocks-v1": "tasks.cells.sweep_blocks:CellSweepBlocks",
+    "CellTakeSides-v1": "tasks.cells.take_sides:CellTakeSides",
     "CellThrowLevers-v1": "tasks.cells.throw_levers:CellThrowLevers",
     "CellTurnTaps-v1": "tasks.cells.turn_taps:CellTurnTaps",
     "DrawTriangle-v1": "tasks.maniskill.draw_triangle:DrawTriangle",
