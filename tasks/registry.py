@@ -42,6 +42,7 @@ CATALOGUE = {
     "CellPutAway-v1": "tasks.cells.put_away:CellPutAway",
     "CellRaiseFrame-v1": "tasks.cells.raise_frame:CellRaiseFrame",
     "CellRunPlant-v1": "tasks.cells.run_plant:CellRunPlant",
+    "CellServe-v1": "tasks.cells.serve:CellServe",
     "CellSetFaders-v1": "tasks.cells.set_faders:CellSetFaders",
     "CellShiftRing-v1": "tasks.cells.shift_ring:CellShiftRing",
     "CellSortCubes-v1": "tasks.cells.sort_cubes:CellSortCubes",

@@ -39,6 +39,7 @@ CATALOGUE = {
     "CellPutAway-v1": "robot_layouts.experts.cells.put_away:put_away",
     "CellRaiseFrame-v1": "robot_layouts.experts.cells.raise_frame:raise_frame",
     "CellRunPlant-v1": "robot_layouts.experts.cells.run_plant:run_plant",
+    "CellServe-v1": "robot_layouts.experts.cells.serve:serve",
     "CellSetFaders-v1": "robot_layouts.experts.cells.set_faders:set_faders",
     "CellShiftRing-v1": "robot_layouts.experts.cells.shift_ring:shift_ring",
     "CellSortCubes-v1": "robot_layouts.experts.cells.sort_cubes:sort_cubes",
