@@ -96,6 +96,12 @@ def rotation_about(axis: Sequence[float], angle: ArrayLike) -> Floats:
     return np.eye(3) + np.sin(angles) * cross + (1 - np.cos(angles)) * (cross @ cross)
 
 
+def cross(first: Floats, second: Floats) -> Floats:
+    """Return cross products, (…, 3): NumPy's to the last bit, but of few vectors much sooner."""
+    ahead, behind = [1, 2, 0], [2, 0, 1]
+    return first[..., ahead] * second[..., behind] - first[..., behind] * second[..., ahead]
+
+
 def rotation_vector(rotation: ArrayLike) -> Floats:
     """Return axis times angle of rotation matrices, the angle in [0, π], (…, 3) (rad)."""
     quaternion = quaternion_of(rotation)
