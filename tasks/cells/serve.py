@@ -16,7 +16,7 @@ class CellServe(CellTask):
     """Hand the can on over the hatch, stand it on the place, and ring.
 
     The can stands before the waiter, x in [-0.15, -0.05], y in [-0.2, -0.12]; the bell before the
-    ringer, x in [-0.3, -0.2], y in [0.2, 0.3] (m). Of the two marks, the waiter reaches only the hatch.
+    ringer, x in [-0.3, -0.2], y in [0.2, 0.3] (m). The waiter reaches the hatch, but not the place.
 
     Success: the can rests on its place, let go, while the bell is pressed by 5 mm.
     """
