@@ -29,8 +29,8 @@ class CellServe(CellTask):
     )
     layout = Layout(
         {
-            "waiter": Placement("fetch", (0.0, -0.68, 0.005), rpy=(0.0, 0.0, pi / 2)),
             "server": Placement("franka_panda", (0.6, 0.35, 0.0), rpy=(0.0, 0.0, -5 * pi / 6)),
+            "waiter": Placement("fetch", (0.0, -0.68, 0.005), rpy=(0.0, 0.0, pi / 2)),
             "ringer": Placement("panda_stick", (-0.65, 0.375, 0.0), rpy=(0.0, 0.0, -pi / 6)),
         }
     )
