@@ -1,5 +1,6 @@
 """What cells share: places before arms, what is inside something, what the instruction chooses."""
 
+from contextlib import closing
 from math import hypot, sqrt
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +12,7 @@ import layouts
 import tasks
 from tasks import CellTask
 from tasks.language.fitting import AS_DECLARED
+from tests.tasks.own import put
 
 ARMS = ("first", "second", "third")
 RING: Any = SimpleNamespace(
@@ -50,3 +52,12 @@ def test_the_instruction_says_what_counts_and_the_observation_does_not():
         "lever",
     }
     env.close()
+
+
+def test_the_instruction_says_in_which_order_cubes_are_stacked():
+    with closing(tasks.make("CellStackInOrder-v1", num_envs=2)) as env:
+        words = env.reset(seed=0)[1]["instruction"]
+        assert ["red at the bottom, then green" in each for each in words] == [True, False]
+        low, middle, high = (0.0, 0.0, 0.021), (0.0, 0.0, 0.061), (0.0, 0.0, 0.101)
+        info = put(env, mark=(0.0, 0.0, 0.001), cube_red=low, cube_green=middle, cube_blue=high)
+        assert info["success"].tolist() == [True, False]
