@@ -1,5 +1,6 @@
 """What cells share: places before arms, what is inside something, what the instruction chooses."""
 
+from contextlib import closing
 from math import hypot, sqrt
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from tasks import CellTask
 from tasks.cells.press_in_order import order_of
 from tasks.cells.take_sides import SIDES
 from tasks.language.fitting import AS_DECLARED
+from tests.tasks.own import put
 
 ARMS = ("first", "second", "third")
 RING: Any = SimpleNamespace(
@@ -95,3 +97,12 @@ def test_blocks_belong_on_the_side_that_is_told(side: int, solved: bool):
         env.simulation.worlds[0].set_pose(f"block_{arm}", (x, y, 0.025))
     assert env.task.evaluate(env.simulation.read())["success"].item() is solved
     env.close()
+
+
+def test_the_instruction_says_in_which_order_cubes_are_stacked():
+    with closing(tasks.make("CellStackInOrder-v1", num_envs=2)) as env:
+        words = env.reset(seed=0)[1]["instruction"]
+        assert ["red at the bottom, then green" in each for each in words] == [True, False]
+        low, middle, high = (0.0, 0.0, 0.021), (0.0, 0.0, 0.061), (0.0, 0.0, 0.101)
+        info = put(env, mark=(0.0, 0.0, 0.001), cube_red=low, cube_green=middle, cube_blue=high)
+        assert info["success"].tolist() == [True, False]
