@@ -1,0 +1,278 @@
+"""Worlds of one model on a device, stepped, read and begun anew together."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from robot_layouts.simulation.backend import Pair, Readout, Velocity
+from robot_layouts.simulation.mujoco.library import mujoco
+from robot_layouts.simulation.mujoco.world import MujocoWorld
+from robot_layouts.simulation.mujoco_warp.contacts import ForceReader
+from robot_layouts.simulation.mujoco_warp.library import mujoco_warp, warp
+from robots import SimulationError
+
+# Room for contacts in each world: as many as at its start, as many as hands add, and as many again.
+_CONTACTS = 48
+_AXES = 3  # constraints of a contact
+_NO_ROOM = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
+
+
+class Starts(NamedTuple):
+    """How episodes begin, a row for each.
+
+    Attributes:
+        qpos: Positions in MuJoCo's order, (K, nq).
+        mocap_pos: Places of bodies that physics does not move, (K, bodies, 3) (m).
+        mocap_quat: How these are turned, wxyz, (K, bodies, 4).
+    """
+
+    qpos: Tensor
+    mocap_pos: Tensor
+    mocap_quat: Tensor
+
+    @classmethod
+    def of(cls, worlds: Iterable[MujocoWorld], device: torch.device) -> Starts:
+        """Return how worlds of MuJoCo's stand, each looked at before the next is asked for."""
+        rows = [
+            (data.qpos.copy(), data.mocap_pos.copy(), data.mocap_quat.copy())
+            for data in (world.data for world in worlds)
+        ]
+        columns = (np.array(own, np.float32) for own in zip(*rows, strict=True))
+        return cls(*(torch.from_numpy(own).to(device) for own in columns))
+
+    def and_then(self, more: Starts) -> Starts:
+        """Return these, and others after them."""
+        return Starts(*(torch.cat(both) for both in zip(self, more, strict=True)))
+
+    def take(self, rows: Tensor) -> Starts:
+        """Return some of them, by their numbers."""
+        return Starts(*(own[rows] for own in self))
+
+
+class DeviceWorlds:
+    """N worlds of one model on a device: what `Moment` and `DeviceSimulation` ask of a backend.
+
+    Attributes:
+        count: Number of worlds N.
+        device: Where they are.
+    """
+
+    def __init__(
+        self, world: MujocoWorld, count: int, device: torch.device, contacts: int | None = None
+    ) -> None:
+        """Put a world of MuJoCo's on a device, so many times.
+
+        Args:
+            world: It.
+            count: How many worlds there are to be.
+            device: Where.
+            contacts: How many contacts there is room for in each; None for enough for hands.
+
+        Raises:
+            SimulationError: If the device has not memory enough, or MuJoCo Warp lacks what the
+                model needs.
+        """
+        self.count, self.device = count, device
+        self._index, self._declared = world.index, world.declared
+        self._host = model = copy.copy(world.model)
+        model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # unknown there
+        self._warp_device = warp.device_from_torch(device)
+        room = 2 * _contacts_at(world) + _CONTACTS if contacts is None else contacts
+        rows = _AXES * room + model.nv + 6 * model.neq + int((model.dof_frictionloss > 0).sum())
+        with _expecting_room(count, device), warp.ScopedDevice(self._warp_device):
+            self._model = mujoco_warp.put_model(model)
+            self._model.opt.warn_overflow = 0  # it is in `overflowed`
+            self._data = mujoco_warp.make_data(model, count, nconmax=room, njmax=rows)
+        view = warp.to_torch
+        data = self._data
+        self._qpos, self._qvel, self._ctrl = view(data.qpos), view(data.qvel), view(data.ctrl)
+        self._mocap = view(data.mocap_pos), view(data.mocap_quat)
+        self._bodies = view(data.xpos), view(data.xquat)
+        self._overflow = view(data.overflow)
+        self._full = sum(int(getattr(mujoco_warp.OverflowType, name)) for name in _NO_ROOM)
+        gains = view(self._model.actuator_biasprm)
+        self._springs, self._dampers = gains[..., 1], gains[..., 2]
+        places = world.index.joints
+        self._joints = [torch.from_numpy(own).to(device) for own in (places.qpos, places.qvel)]
+        self._roots = torch.from_numpy(model.body_rootid.astype("int64")).to(device)
+        self._touched = torch.zeros(count, dtype=torch.bool, device=device)  # since its reset
+        self._forces: dict[tuple[Pair, ...], ForceReader] = {}
+        self._found: dict[tuple[Velocity, ...], tuple[Tensor, Tensor]] = {}
+        self._works: dict[str, Any] = {}  # graphs, None as long as there is none
+        self._located = False
+
+    # -- motion ------------------------------------------------------------------------------
+
+    def drive(self, targets: Any, velocities: Any | None) -> None:
+        """Set what all joints are driven to, (N, dof) each (rad, m, and per s)."""
+        pulls = -self._springs * targets
+        if velocities is not None:
+            pulls = pulls - self._dampers * velocities
+        self._ctrl.copy_(pulls)
+
+    def step(self, count: int) -> None:
+        """Advance all worlds by some of MuJoCo's steps; see `MujocoWorld.step`."""
+
+        def advance() -> None:
+            self._data.qacc_warmstart.zero_()
+            for _ in range(count):
+                mujoco_warp.step(self._model, self._data)
+
+        self._do(f"{count} steps", advance)
+        self._touched.fill_(True)
+        self._located = False
+
+    def begin(self, where: Tensor, starts: Starts) -> None:
+        """Let some worlds stand as episodes begin, at rest.
+
+        Args:
+            where: Which, (N,) bool.
+            starts: How each would, N rows.
+        """
+        column = where[:, None]
+        self._qpos.copy_(torch.where(column, starts.qpos, self._qpos))
+        self._qvel.copy_(torch.where(column, torch.zeros_like(self._qvel), self._qvel))
+        for own, rows in zip(self._mocap, starts[1:], strict=True):
+            own.copy_(torch.where(column[:, :, None], rows, own))
+        self._overflow.masked_fill_(where, 0)
+        self._touched &= ~where
+        self._located = False
+
+    def place(self, body: str, pose: Tensor, where: Tensor) -> None:
+        """Move a body in some worlds; it goes on as fast.
+
+        Args:
+            body: Its name.
+            pose: Place (m) and orientation (wxyz), (N, 7).
+            where: In which worlds, (N,) bool.
+        """
+        model, number = self._host, self._index.body(None, body)
+        if (held := model.body_mocapid[number]) >= 0:
+            owners = [(self._mocap[0][:, held], pose[:, :3]), (self._mocap[1][:, held], pose[:, 3:])]
+        else:
+            at = model.jnt_qposadr[model.body_jntadr[number]]
+            owners = [(self._qpos[:, at : at + 7], pose)]
+        for own, rows in owners:
+            own.copy_(torch.where(where[:, None], rows, own))
+        self._located = False
+
+    # -- reading -----------------------------------------------------------------------------
+
+    def read(self) -> Readout:
+        """Return poses and joints of all worlds; they stay as they are when the worlds move on."""
+        self._locate()
+        places, turns = self._bodies
+        poses: Any = torch.cat((places[:, 1:], turns[:, 1:]), -1).transpose(0, 1).contiguous()
+        qpos, qvel = self._joints
+        joints: Any = self._qpos[:, qpos], self._qvel[:, qvel]
+        return Readout(poses, *joints)
+
+    def velocities(self, wanted: tuple[Velocity, ...]) -> Any:
+        """Return velocities of bodies' centres of mass, (K, N, 3) (m/s, rad/s, world frame)."""
+        self._locate()
+        if wanted not in self._found:
+            bodies = [self._index.body(None, name) for name, _ in wanted]
+            spins = torch.tensor([[kind == "angular"] for _, kind in wanted], device=self.device)
+            self._found[wanted] = torch.tensor(bodies, device=self.device), spins
+        bodies, spins = self._found[wanted]
+        data, roots = self._data, self._roots
+        both, middles, centres = map(warp.to_torch, (data.cvel, data.xipos, data.subtree_com))
+        spin, speed = both[:, bodies, :3], both[:, bodies, 3:]
+        arm = middles[:, bodies] - centres[:, roots[bodies]]
+        speed = speed + torch.linalg.cross(spin, arm)
+        return torch.where(spins, spin, speed).transpose(0, 1)
+
+    def root_velocities(self) -> Any:
+        """Return velocities of the robots' roots, which are fixed, (R, N, 6)."""
+        return torch.zeros((len(self._index.robots), self.count, 6), device=self.device)
+
+    def body_joints(self, body: str) -> Any:
+        """Return positions, then velocities of a body's joints, (N, 2 · joints)."""
+        joints = self._index.jointed[body]
+        rows = [self._qpos[:, i] for i in joints.qpos.tolist()]
+        rows += [self._qvel[:, i] for i in joints.qvel.tolist()]
+        return torch.stack(rows, 1)
+
+    def forces(self, pairs: tuple[Pair, ...]) -> Any:
+        """Return contact forces of the last step of physics, (P, N, 3) (N, world frame)."""
+        if pairs not in self._forces:
+            self._forces[pairs] = ForceReader(pairs, self._host, self._index, self._warp_device)
+        with self._in_turn():
+            forces = self._forces[pairs].read(self._data)
+        return forces * self._touched[:, None]
+
+    @property
+    def overflowed(self) -> Tensor:
+        """Where a contact was left out since the reset, as there was no room for it, (N,) bool."""
+        return (self._overflow & self._full) != 0
+
+    # -- inside ------------------------------------------------------------------------------
+
+    def _locate(self) -> None:
+        """Compute where all bodies are and how fast, unless that is known."""
+        if self._located:
+            return
+
+        def locate() -> None:
+            mujoco_warp.kinematics(self._model, self._data)
+            mujoco_warp.com_pos(self._model, self._data)
+            mujoco_warp.com_vel(self._model, self._data)
+
+        self._do("locate", locate)
+        self._located = True
+
+    def _do(self, name: str, work: Callable[[], None]) -> None:
+        """Do work of MuJoCo Warp's; on a card from the second time on as a graph that it keeps."""
+        if self.device.type == "cuda" and self._works.get(name, False) is None:
+            with warp.ScopedDevice(self._warp_device), warp.ScopedCapture() as capture:
+                work()
+            self._works[name] = capture.graph
+        with self._in_turn():
+            if (graph := self._works.get(name)) is None:
+                self._works[name] = None
+                work()
+            else:
+                warp.capture_launch(graph)
+
+    @contextmanager
+    def _in_turn(self) -> Iterator[None]:
+        """Let what Warp does come after what torch did before, and before what it does next."""
+        with warp.ScopedDevice(self._warp_device):
+            if self.device.type == "cpu":
+                yield
+                return
+            own: Any = torch.cuda.ExternalStream(self._warp_device.stream.cuda_stream)
+            torchs = torch.cuda.current_stream(self.device)
+            own.wait_stream(torchs)
+            yield
+            torchs.wait_stream(own)
+
+
+def _contacts_at(world: MujocoWorld) -> int:
+    """Return how many contacts a world has as it stands."""
+    data = copy.copy(world.data)
+    mujoco.mj_fwdPosition(world.model, data)
+    return data.ncon
+
+
+@contextmanager
+def _expecting_room(count: int, device: torch.device) -> Iterator[None]:
+    """Say what to do where a device has too little memory for so many worlds."""
+    try:
+        yield
+    except NotImplementedError as error:
+        raise SimulationError(f"MuJoCo Warp cannot do what this task needs: {error}") from error
+    except RuntimeError as error:
+        if "alloc" not in str(error).lower() and "memory" not in str(error).lower():
+            raise
+        raise SimulationError(
+            f"{count} worlds need more memory than {device} has; take fewer (num_envs), or less"
+            f" room for contacts in each (contacts): {error}"
+        ) from error
