@@ -50,6 +50,7 @@ class DeviceSimulation:
         self.worlds = host.worlds[:1]
         self.control = DeviceControl(host.layout, device)
         self.index = DeviceIndex(host.layout, world.index.built, device)
+        self.control.find(self.index)
         self.bodies = DeviceWorlds(world, num_envs, device, contacts)
         self._steps = host.substeps * world.inner
         self._moment = Moment(self.bodies)
