@@ -14,6 +14,7 @@ from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
 from robot_layouts.core.bounds import checked_whole, shown
+from robot_layouts.simulation.mujoco_warp.arrays import beside
 from robots import ActionError, SimulationError, TaskError, UnknownNameError
 from tasks.engine.checks import ELAPSED, SEED, SOLVED, SUCCESS, checked_options, checked_seeds
 from tasks.engine.env import TaskEnv
@@ -261,7 +262,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         memory = self.task.memory
         for name, fresh in self.task.remember(state).items():
             before = vars(memory).get(name, fresh)
-            setattr(memory, name, torch.where(_beside(begun, fresh), fresh, before))
+            setattr(memory, name, torch.where(beside(begun, fresh), fresh, before))
         return state
 
     def _info(self, state: Any) -> Info:
@@ -428,14 +429,9 @@ def _chosen(seeds: Tensor, episodes: Tensor, count: int) -> Tensor:
     return (mixed & (2**63 - 1)) % count
 
 
-def _beside(flags: Tensor, rows: Tensor) -> Tensor:
-    """Return flags, (N,), in as many axes as rows have, (N, …)."""
-    return flags.view(-1, *[1] * (rows.ndim - 1))
-
-
 def _zeroed(rows: Tensor, where: Tensor) -> Tensor:
     """Return rows, (N, …), with nothing but zeros in some of them."""
-    return rows.masked_fill(_beside(where, rows), 0)
+    return rows.masked_fill(beside(where, rows), 0)
 
 
 def _each(tree: Any, change: Callable[[Tensor], Tensor]) -> Any:

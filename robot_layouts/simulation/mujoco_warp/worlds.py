@@ -15,6 +15,7 @@ from robot_layouts.simulation.backend import Pair, Readout, Velocity
 from robot_layouts.simulation.mujoco.library import mujoco
 from robot_layouts.simulation.mujoco.world import MujocoWorld
 from robot_layouts.simulation.mujoco_warp.contacts import ForceReader
+from robot_layouts.simulation.mujoco_warp.linkages import LinkageDrives
 from robot_layouts.simulation.mujoco_warp.library import mujoco_warp, warp
 from robots import SimulationError
 
@@ -99,6 +100,8 @@ class DeviceWorlds:
         self._full = sum(int(getattr(mujoco_warp.OverflowType, name)) for name in _NO_ROOM)
         gains = view(self._model.actuator_biasprm)
         self._springs, self._dampers = gains[..., 1], gains[..., 2]
+        self._linkages = LinkageDrives(world.declared.layout, world.index, self._warp_device)
+        self._targets = torch.zeros((count, model.nu), device=device)
         places = world.index.joints
         self._joints = [torch.from_numpy(own).to(device) for own in (places.qpos, places.qvel)]
         self._roots = torch.from_numpy(model.body_rootid.astype("int64")).to(device)
@@ -116,13 +119,16 @@ class DeviceWorlds:
         if velocities is not None:
             pulls = pulls - self._dampers * velocities
         self._ctrl.copy_(pulls)
+        self._targets.copy_(targets)
 
     def step(self, count: int) -> None:
         """Advance all worlds by some of MuJoCo's steps; see `MujocoWorld.step`."""
 
         def advance() -> None:
             self._data.qacc_warmstart.zero_()
+            targets = warp.from_torch(self._targets)
             for _ in range(count):
+                self._linkages.pull(self._model, self._data, targets)
                 mujoco_warp.step(self._model, self._data)
 
         self._do(f"{count} steps", advance)
