@@ -82,6 +82,7 @@ def speed(task: str, count: int, device: str, steps: int) -> dict[str, Any]:
     """Return how many steps a second a task takes, in so many worlds, and what resets cost."""
     rates: dict[str, float] = {}
     found: dict[str, Any] = {}
+    info: dict[str, Any] = {}
     for mode in (AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED):
         since = time.perf_counter()
         with closing(DeviceTask(task, count, device, mode)) as env:
@@ -132,7 +133,8 @@ def _waits(env: DeviceTask, action: torch.Tensor) -> str:
 def _actions(env: DeviceTask, count: int) -> torch.Tensor:
     """Return random actions on the device, (count, N, A)."""
     generator = torch.Generator().manual_seed(SEED)
-    rows = torch.rand((count, *env.action_space.shape), generator=generator)
+    shape: Any = env.action_space.shape
+    rows = torch.rand((count, *shape), generator=generator)
     return (2.0 * rows - 1.0).to(env.device)
 
 

@@ -1,4 +1,4 @@
-"""PPO learns to pick a cube in thousands of worlds on one device, and leaves its learning curve.
+"""PPO learns to push a cube in thousands of worlds on one device, and leaves its learning curve.
 
     pip install 'robot-layouts[mujoco_warp]'
     python examples/ppo_on_device.py --device cuda:0
@@ -27,27 +27,50 @@ from tasks.interfaces.device import DeviceTask
 EPISODE = 50  # steps
 TEST_SEED = 1_000_000  # of the first start to be examined from
 WIDTH = 256  # of the networks' layers
-RATE, DISCOUNT, TRACE, CLIP, GRADIENT = 3e-4, 0.8, 0.9, 0.2, 0.5
+RATE, DISCOUNT, TRACE, CLIP, GRADIENT = 7e-4, 0.9, 0.95, 0.2, 0.5
 EPOCHS, PARTS, MOST_CHANGE = 8, 32, 0.1  # of each batch, and how far a policy may leave it (KL)
 
 
 class Policy(nn.Module):
     """What acts, and what tells how good a state is."""
 
+    mean: Tensor
+    variance: Tensor
+    count: Tensor
+
     def __init__(self, seen: int, numbers: int) -> None:
         """Take the numbers of an observation and of an action."""
         super().__init__()
+        self.register_buffer("mean", torch.zeros(seen))  # of what was seen, and its variance
+        self.register_buffer("variance", torch.ones(seen))
+        self.register_buffer("count", torch.tensor(1e-4))
         self.actor, self.critic = _network(seen, numbers, 0.01), _network(seen, 1, 1.0)
         self.log_std = nn.Parameter(torch.full((numbers,), -0.5))
+
+    @torch.no_grad()
+    def look(self, obs: Tensor) -> None:
+        """Take observations, (N, D), into their mean and variance, by which they are normalised."""
+        count = self.count + len(obs)
+        way, share = obs.mean(0) - self.mean, len(obs) / count
+        self.mean += way * share
+        self.variance += (obs.var(0) + way * way * (1 - share) - self.variance) * share
+        self.count.copy_(count)
+
+    def best(self, obs: Tensor) -> Tensor:
+        """Return the mean actions, (N, A)."""
+        return self.actor(self._normalised(obs))
 
     def distribution(self, obs: Tensor) -> torch.distributions.Normal:
         """Return how actions are distributed, (N, A)."""
         spread = self.log_std.exp()
-        return torch.distributions.Normal(self.actor(obs), spread, validate_args=False)
+        return torch.distributions.Normal(self.best(obs), spread, validate_args=False)
 
     def value(self, obs: Tensor) -> Tensor:
         """Return what is still to be earned, (N,)."""
-        return self.critic(obs)[:, 0]
+        return self.critic(self._normalised(obs))[:, 0]
+
+    def _normalised(self, obs: Tensor) -> Tensor:
+        return ((obs - self.mean) / (self.variance + 1e-8).sqrt()).clamp(-5.0, 5.0)
 
 
 class Batch(NamedTuple):
@@ -116,7 +139,8 @@ def improve(policy: Policy, optimizer: torch.optim.Optimizer, batch: Batch) -> N
             nn.utils.clip_grad_norm_(policy.parameters(), GRADIENT)
             optimizer.step()
         if torch.stack(changes).mean() > MOST_CHANGE:
-            return
+            break
+    policy.look(flat.obs)
 
 
 @torch.no_grad()
@@ -125,7 +149,7 @@ def examine(env: DeviceTask, policy: Policy) -> tuple[float, float]:
     obs, _ = env.reset(seed=TEST_SEED)
     succeeded = last = torch.zeros(env.num_envs, dtype=torch.bool, device=env.device)
     for _ in range(EPISODE):
-        obs, *_, info = env.step(policy.actor(obs))
+        obs, *_, info = env.step(policy.best(obs))
         last = info["success"]
         succeeded = succeeded | last
     return succeeded.float().mean().item(), last.float().mean().item()
@@ -143,6 +167,7 @@ def learn(options: argparse.Namespace) -> list[dict[str, Any]]:
         policy = Policy(*(shape[0] for shape in shapes if shape)).to(env.device)
         optimizer = torch.optim.Adam(policy.parameters(), lr=RATE, eps=1e-5)
         obs, _ = env.reset(seed=options.seed)
+        policy.look(obs)
         steps, seconds = 0, 0.0
         while True:
             success, at_end = examine(tests, policy)
@@ -184,12 +209,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     add = parser.add_argument
-    add("--task", default="PickCube-v1", help="task (default %(default)s)")
+    add("--task", default="PushCube-v1", help="task (default %(default)s)")
     add("--device", default="cuda:0", help="cuda:0 or cpu (default %(default)s)")
-    add("--steps", type=int, default=20_000_000, help="steps at most (default %(default)s)")
-    add("--envs", type=int, default=4096, help="environments to learn in (default %(default)s)")
+    add("--steps", type=int, default=5_000_000, help="steps at most (default %(default)s)")
+    add("--envs", type=int, default=1024, help="environments to learn in (default %(default)s)")
     add("--tests", type=int, default=512, help="test episodes (default %(default)s)")
-    add("--horizon", type=int, default=16, help="steps of a batch (default %(default)s)")
+    add("--horizon", type=int, default=25, help="steps of a batch (default %(default)s)")
     add("--rounds", type=int, default=5, help="batches between examinations (default %(default)s)")
     add("--enough", type=float, default=0.95, help="share that is enough (default %(default)s)")
     add("--seed", type=int, default=0, help="of the policy and of the episodes (default 0)")

@@ -329,7 +329,7 @@ def _constant(values: Any) -> Floats:
 _copies: dict[Any, tuple[Any, Tensor]] = {}
 
 
-def _kept(values: Any, device: torch.device) -> Tensor:
+def _kept(values: Any, device: Any) -> Tensor:
     """Return nested tuples of numbers, or a constant array of a module, on a device."""
     key = (values if isinstance(values, tuple) else id(values)), device
     if key not in _copies:  # which holds the array, so that its number stays its own

@@ -33,19 +33,20 @@ from robots.descriptor import Vector3
 _NOTHING = np.empty(0, np.float32)
 _Arguments = ParamSpec("_Arguments")
 _Owner = TypeVar("_Owner")
+_State = TypeVar("_State", bound="State")
 _Value = TypeVar("_Value")
 
 
 def remembered(
-    compute: Callable[Concatenate[State, _Arguments], _Value],
-) -> Callable[Concatenate[State, _Arguments], _Value]:
+    compute: Callable[Concatenate[_State, _Arguments], _Value],
+) -> Callable[Concatenate[_State, _Arguments], _Value]:
     """Compute once per state and arguments: rewards ask for what success was judged by.
 
     Views of what was read cost less than a look-up and are not remembered.
     """
 
     @wraps(compute)
-    def look_up(self: State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
+    def look_up(self: _State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
         key = (compute, args, *kwargs.items()) if kwargs else (compute, args)
         found = self.memo.get(key)
         if found is None:
@@ -474,6 +475,7 @@ def _both_velocities(bodies: tuple[str, ...]) -> tuple[Velocity, ...]:
 
 @cache  # making one checks it, which is too slow for every step
 def within(fingers: Fingers, max_angle: float) -> Fingers:
+    """Return fingers whose force may be so far from straight (degrees)."""
     return replace(fingers, max_angle=max_angle)
 
 

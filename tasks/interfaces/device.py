@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NamedTuple, NoReturn
 
 import numpy as np
 import torch
-from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from torch import Tensor
@@ -29,7 +28,24 @@ from tasks.native.format import observation_keys
 from tasks.registry import get_task_class, make_scenario
 
 STARTS = 1024
+VARIED = ("bases", "damping", "friction", "mass", "spread", "stiffness")  # axes of randomization
 DIVERGED, OVERFLOWED = "diverged", "overflowed"  # in info
+
+
+class _Given(NamedTuple):
+    """Episodes whose seeds are given.
+
+    Attributes:
+        starts: Those that are kept, and theirs.
+        flags: Which worlds have one, (N,) bool.
+        rows: The numbers of their starts, (N,) int64.
+        seeds: The seeds, (N,) int64.
+    """
+
+    starts: Any
+    flags: Tensor
+    rows: Tensor
+    seeds: Tensor
 
 
 class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
@@ -67,6 +83,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         starts: int = STARTS,
         first_seed: int | None = None,
         contacts: int | None = None,
+        deterministic: bool = False,
         **fields: Any,
     ) -> None:
         """Draw the starts, and put the worlds on the device.
@@ -82,6 +99,8 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             starts: How many starts are kept on the device.
             first_seed: Seed of the first of them; None takes the task's.
             contacts: How many contacts each world has room for; None for enough for hands.
+            deterministic: Whether a card gives equal seeds equal bits, which takes it longer; a
+                processor always does.
             fields: Other arguments of `tasks.make`.
 
         Raises:
@@ -96,7 +115,8 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         self.num_envs = count = checked_whole("num_envs", num_envs, 1, None, TaskError)
         kept = checked_whole("starts", starts, 1, None, TaskError)
         cls = get_task_class(task_id)
-        scenario = make_scenario(cls, 1, **{**fields, "simulator": "mujoco"})
+        making: Any = {**fields, "simulator": "mujoco"}
+        scenario = make_scenario(cls, 1, **making)
         _refuse(scenario)
         from robot_layouts.simulation.mujoco_warp.simulation import DeviceSimulation
         from robot_layouts.simulation.mujoco_warp.worlds import Starts
@@ -106,8 +126,10 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         _refuse_task(host)
         self._draw = lambda seeds: Starts.of(map(self._start, seeds), on)
         self.seeds = range(first, first + kept)
-        self._starts = self._draw(self.seeds)
-        self._simulation = DeviceSimulation(host.simulation, count, on, contacts)
+        self._starts = self._draw(self.seeds).without_constants(self._world.as_built)
+        self._simulation = DeviceSimulation(
+            host.simulation, self._starts, count, contacts=contacts, deterministic=deterministic
+        )
         self._elapsed = torch.zeros(count, dtype=torch.int32, device=on)
         self.task = task = object.__new__(cls)
         vars(task).update(vars(host.task))
@@ -118,6 +140,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             memory=Memory(),
             _rngs=_NoStreams(cls.__name__),
             _elapsed=self._elapsed,
+            _randomizer=None,
         )
         self.action_split, self._mode = host.action_split, host.observer.mode
         self._keys, self._kept = observation_keys(host.layout), controllers.entries(host.simulation)
@@ -125,17 +148,18 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         self._scores = torch.tensor([0.0, *task.stages.values()], device=on)
         self._seeds = torch.arange(count, device=on) + secrets.randbelow(2**32 - count)
         self._episodes = torch.full_like(self._seeds, -1)
-        self._passed, self._rows = torch.zeros_like(self._seeds), torch.zeros_like(self._seeds)
+        self._passed = torch.zeros_like(self._seeds)
         self._started = torch.zeros_like(self._seeds)  # with the start of which seed
         self._nowhere = torch.zeros(count, dtype=torch.bool, device=on)
         self._over = self._nowhere
+        self._ungiven = _Given(self._starts, self._nowhere, self._started, self._started)
         self._reward_mode = scenario.reward_mode or task.reward_modes[0]
         self.metadata = {  # type: ignore[misc]
             **self.metadata,
             "autoreset_mode": self.autoreset_mode,
             "render_fps": round(scenario.control_frequency),
         }
-        self.single_action_space: Box = host.single_action_space
+        self.single_action_space = host.single_action_space
         self.action_space = batch_space(self.single_action_space, count)
         self.single_observation_space = host.single_observation_space
         self.observation_space = batch_space(self.single_observation_space, count)
@@ -212,6 +236,11 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             obs, info = self._observation(state, info), {**info, **final}
         return obs, reward, terminated, truncated, info
 
+    @property
+    def state(self) -> Any:
+        """What all worlds look like now, as tensors; see `robot_layouts.simulation.State`."""
+        return self._state
+
     def close_extras(self, **kwargs: Any) -> None:
         """Let the worlds go."""
         self._host.close()
@@ -221,46 +250,44 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
     # -- inside ------------------------------------------------------------------------------
 
     def _start(self, seed: int) -> Any:
-        """Return the world of MuJoCo's in which an episode begins that has a seed."""
+        """Return MuJoCo's world, in which an episode has begun that has a seed."""
         self._host.reset(seed)
+        return self._world
+
+    @property
+    def _world(self) -> Any:
         backend: Any = self._host.simulation.backend
         return backend.worlds[0]
 
     def _restart(self, where: Tensor, seeds: Sequence[int | None] | None = None) -> None:
         """Begin episodes in some worlds, each with the start of its seed if that is given."""
-        self._episodes = self._episodes + where
-        starts = self._starts
-        if seeds is not None:
-            starts, given, rows = self._given(seeds)
-            given &= where
-            values = torch.tensor([seed or 0 for seed in seeds], device=self.device)
-            self._seeds = torch.where(given, values, self._seeds)
-            self._episodes = self._episodes.masked_fill(given, 0)
-        chosen = _chosen(self._seeds, self._episodes, len(self.seeds))
-        begun = self.seeds[0] + chosen
-        if seeds is not None:
-            chosen, begun = torch.where(given, rows, chosen), torch.where(given, values, begun)
+        starts, given, rows, own = self._ungiven if seeds is None else self._given(seeds)
+        given = given & where
+        self._seeds = torch.where(given, own, self._seeds)
+        self._episodes = (self._episodes + where).masked_fill(given, 0)
+        row = chosen(self._seeds, self._episodes, len(self.seeds))
+        begun = torch.where(given, own, self.seeds[0] + row)
         self._started = torch.where(where, begun, self._started)
-        self._simulation.begin(where, starts.take(chosen))
+        self._simulation.begin(where, starts.take(torch.where(given, rows, row)))
         self._elapsed.masked_fill_(where, 0)
         self._passed.masked_fill_(where, 0)
 
-    def _given(self, seeds: Sequence[int | None]) -> tuple[Any, Tensor, Tensor]:
-        """Return starts, which worlds have a given seed, and the row of each one's, (N,) both."""
+    def _given(self, seeds: Sequence[int | None]) -> _Given:
+        """Look up the starts of seeds, and draw those that are not kept."""
         more = sorted({seed for seed in seeds if seed is not None} - set(self.seeds))
         starts = self._starts.and_then(self._draw(more)) if more else self._starts
         places = {seed: row for row, seed in enumerate([*self.seeds, *more])}
-        rows = [0 if seed is None else places[seed] for seed in seeds]
-        given = [seed is not None for seed in seeds]
-        on = self.device
-        return starts, torch.tensor(given, device=on), torch.tensor(rows, device=on)
+        known = [0 if seed is None else seed for seed in seeds]
+        columns = [seed is not None for seed in seeds], [places.get(s, 0) for s in known], known
+        return _Given(starts, *(torch.tensor(column, device=self.device) for column in columns))
 
     def _look(self, begun: Tensor) -> Any:
         """Read the worlds, of which some have just begun an episode."""
         state = self._state = self._simulation.read()
         self._simulation.hold(state, begun)
         memory = self.task.memory
-        for name, fresh in self.task.remember(state).items():
+        remembered: Mapping[str, Any] = self.task.remember(state)
+        for name, fresh in remembered.items():
             before = vars(memory).get(name, fresh)
             setattr(memory, name, torch.where(beside(begun, fresh), fresh, before))
         return state
@@ -272,7 +299,9 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
                 self._passed += (self._passed == number) & flag
             self._passed.masked_fill_(flags[-1], len(flags))
             info |= {STAGE: self._passed.clone(), STAGE_SCORE: self._scores[self._passed]}
-        finite = (state.joint_positions.isfinite() & state.joint_velocities.isfinite()).all(1)
+        finite = state.all_poses.isfinite().all(-1).all(0) & state.joint_velocities.isfinite().all(
+            1
+        )
         return info | {
             DIVERGED: ~finite,
             OVERFLOWED: self._simulation.bodies.overflowed,
@@ -284,12 +313,12 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         if self._mode.nothing:
             return torch.empty((self.num_envs, 0), device=self.device)
         robots = {name: state.native_joints(name) for name in self._keys}
-        recalled = self._simulation.control.recall() if self._kept else []
+        recalled: list[Any] = self._simulation.control.recall() if self._kept else []
         for entry in self._kept:
             rows = torch.cat([recalled[part] for part in entry.parts], 1)
             order = self._simulation.index.native[entry.robot] if entry.joints else None
             robots[entry.robot].append(rows if order is None else rows[:, order])
-        parts = self.task.observe(state, info)
+        parts: dict[str, Any] = self.task.observe(state, info)
         if not self._mode.flat:
             return self._named(robots, parts)
         rows = [row for own in robots.values() for row in own]
@@ -304,7 +333,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             agent.update(tree if key is None else {key: tree})
         return {"agent": agent, "extra": dict(parts)}
 
-    def _reward(self, state: Any, action: Tensor, info: Info) -> Tensor:
+    def _reward(self, state: Any, action: Any, info: Info) -> Tensor:
         if self._reward_mode == "sparse":
             return info[SOLVED].float()
         if self._reward_mode == "none":
@@ -386,7 +415,7 @@ def _refuse(scenario: Scenario) -> None:
     wanted = {
         f"obs_mode={scenario.obs_mode!r} (of {', '.join(known)})": scenario.obs_mode not in known,
         "render_mode": scenario.render_mode is not None,
-        "randomization": scenario.randomization is not None,
+        **_unvaried(scenario),
         "touch": scenario.touch is not None,
     }
     if refused := [name for name, given in wanted.items() if given]:
@@ -394,6 +423,12 @@ def _refuse(scenario: Scenario) -> None:
             f"simulator 'mujoco_warp' does without {', '.join(refused)}; simulator='mujoco' does"
             " all of it"
         )
+
+
+def _unvaried(scenario: Scenario) -> dict[str, bool]:
+    """Return which axes of a scenario's randomization are declared that do not vary on a device."""
+    declared = scenario.randomization.declared if scenario.randomization else ()
+    return {f"randomization of {axis}": True for axis in declared if axis not in VARIED}
 
 
 def _refuse_task(env: TaskEnv) -> None:
@@ -420,7 +455,7 @@ _ROUNDS = ((30, -0x40A7B892E31B1A47), (27, -0x6B2FB644ECCEEE15), (31, 1))  # of 
 _BITS = 64
 
 
-def _chosen(seeds: Tensor, episodes: Tensor, count: int) -> Tensor:
+def chosen(seeds: Tensor, episodes: Tensor, count: int) -> Tensor:
     """Return one of ``count`` numbers for each seed and number of an episode, (N,) int64 each."""
     mixed = seeds * _STEP + episodes * _STRIDE
     for shift, factor in _ROUNDS:

@@ -411,6 +411,11 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
 
 
 def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Return a mode by itself, its value or its name.
+
+    Raises:
+        TaskError: If there is no such mode.
+    """
     for choice in AutoresetMode:
         if mode in (choice, choice.value, choice.name):
             return choice

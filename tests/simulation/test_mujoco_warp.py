@@ -75,8 +75,9 @@ def test_a_state_on_a_device_tells_what_a_state_does(states):
 
 def test_forces_on_a_device_are_read_by_their_numbers(states):
     _, device = states
-    thumb, cube = device.contact_force("left", "panda_leftfinger"), device.contact_force(
-        "left", "panda_leftfinger", "cube"
+    thumb, cube = (
+        device.contact_force("left", "panda_leftfinger"),
+        device.contact_force("left", "panda_leftfinger", "cube"),
     )
     assert thumb.tolist() == [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]
     assert cube.tolist() == [[6.0, 7.0, 8.0], [9.0, 10.0, 11.0]]
@@ -120,5 +121,3 @@ def test_poses_are_followed_on_a_device_as_one_by_one():
             np.testing.assert_allclose(own.numpy(), expected[0], atol=1e-6)
     assert arrived[:-1].all()
     assert not arrived[-1]
-
-

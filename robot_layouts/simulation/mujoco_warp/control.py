@@ -57,7 +57,8 @@ class DeviceControl(ModeController):
         present: Any = state.joint_positions
         if len(self.targets) != state.num_envs:
             self.targets = present.clone()
-        self.targets = torch.where(where[:, None], present, self.targets)
+        before: Any = self.targets
+        vars(self)["targets"] = torch.where(where[:, None], present, before)
         for arm in self._arms.values():
             if arm.tool.group.target:
                 arm.restart(state, where)
@@ -65,7 +66,9 @@ class DeviceControl(ModeController):
     def driven(self, action: Any, state: DeviceState) -> tuple[Any, Any | None]:
         """Return what joints are driven to, and remember it; see `ModeController.command`."""
         present: Any = state.joint_positions
-        base = torch.where(self._from_target, self.targets, present) if self._any_target else present
+        before: Any = self.targets
+        from_target: Any = self._from_target
+        base = torch.where(from_target, before, present) if self._any_target else present
         targets: Any = self._positions.targets(action, base)
         scaled = self._in_units(action)
         for arm in self._arms.values():

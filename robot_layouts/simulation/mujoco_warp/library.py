@@ -10,7 +10,7 @@ warp = optional("warp", _WHAT, "mujoco_warp")
 Raises:
     MissingPackageError: While this is imported, if it is not installed.
 """
-warp.config.log_level = warp.LOG_WARNING
+warp.config.log_level = warp.LOG_ERROR  # it warns where there is no card
 warp.init()
 
 mujoco_warp = optional("mujoco_warp", _WHAT, "mujoco_warp")

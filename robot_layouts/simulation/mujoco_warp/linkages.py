@@ -75,7 +75,8 @@ def _pull(
 ) -> None:
     """Pull one world's joints of a group: leaders ahead of where they are, all others there."""
     world = warp.tid()
-    value, speed, leaders = float(0.0), float(0.0), float(0.0)
+    # Warp takes what is written 0.0 for a constant.
+    value, speed, leaders = float(0.0), float(0.0), float(0.0)  # noqa: UP018
     for joint in range(count):
         if leads[joint] != 0:
             value += (qpos[world, positions[joint]] - offsets[joint]) / multipliers[joint]
@@ -88,7 +89,7 @@ def _pull(
     for joint in range(count):
         place, pace = value, multipliers[joint] * speed
         if leads[joint] != 0:
-            place, pace = ahead, float(0.0)
+            place, pace = ahead, float(0.0)  # noqa: UP018
         drive = driven[joint]
         target = multipliers[joint] * place + offsets[joint]
         pulled = gains[row, drive][1] * target + gains[row, drive][2] * pace

@@ -32,28 +32,38 @@ class DeviceSimulation:
     """
 
     def __init__(
-        self, host: Simulation, num_envs: int, device: torch.device, contacts: int | None = None
+        self,
+        host: Simulation,
+        starts: Starts,
+        num_envs: int,
+        *,
+        contacts: int | None = None,
+        deterministic: bool = False,
     ) -> None:
-        """Put the first world of a simulation in MuJoCo on a device, so many times.
+        """Put the first world of a simulation in MuJoCo on the device of its starts.
 
         Args:
             host: The simulation.
+            starts: How episodes begin in it.
             num_envs: How many worlds there are to be.
-            device: Where.
             contacts: How many contacts there is room for in each; None for enough for hands.
+            deterministic: Whether a card adds in the same order whenever it does the same again.
 
         Raises:
             SimulationError: If the device lacks memory, or MuJoCo Warp something of the model.
         """
         world: MujocoWorld = host.backend.worlds[0]  # pyright: ignore[reportAttributeAccessIssue]
+        device = starts.rows["qpos"].device
         self.layout, self.num_envs, self.device = host.layout, num_envs, device
         self.worlds = host.worlds[:1]
         self.control = DeviceControl(host.layout, device)
         self.index = DeviceIndex(host.layout, world.index.built, device)
         self.control.find(self.index)
-        self.bodies = DeviceWorlds(world, num_envs, device, contacts)
+        self.bodies = DeviceWorlds(
+            world, starts, num_envs, contacts=contacts, deterministic=deterministic
+        )
         self._steps = host.substeps * world.inner
-        self._moment = Moment(self.bodies)
+        self._moment = self._present()
 
     @property
     def modes(self) -> DeviceControl:
@@ -84,7 +94,7 @@ class DeviceSimulation:
     def place(
         self,
         body: str,
-        positions: Tensor,
+        positions: Any,
         quaternion: Quaternion = IDENTITY,
         *,
         where: Tensor,
@@ -116,4 +126,8 @@ class DeviceSimulation:
     def _change(self) -> None:
         """Let states that were read be past."""
         self._moment.past = True
-        self._moment = Moment(self.bodies)
+        self._moment = self._present()
+
+    def _present(self) -> Moment:
+        backend: Any = self.bodies  # which has the verbs that a moment asks for
+        return Moment(backend)

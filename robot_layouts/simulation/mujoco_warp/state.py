@@ -79,7 +79,8 @@ class DeviceState(State):
     @remembered
     def rotation(self, body: str) -> Any:
         """Rotation matrix of a body, shape (N, 3, 3); its columns are the body's axes."""
-        return rotation_matrix(self.quaternion(body))
+        turns: Any = self.quaternion(body)
+        return rotation_matrix(turns)
 
     @remembered
     def last_euler_angle(self, body: str) -> Any:
@@ -161,7 +162,7 @@ def grasped(fingers: Fingers, forces: Any, turns: Any) -> Tensor:
 def _between(poses: Any, mean: MeanFrame) -> Tensor:
     """Return the poses of a frame that lies between or beside others, (N, 7)."""
     orientation, points, offset = mean
-    turn: Tensor = poses[orientation, :, 3:]
+    turn: Any = poses[orientation, :, 3:]
     place: Any = sum(poses[point, :, :3] for point in points) / len(points)
     if any(offset):
         place = place + rotation_matrix(turn) @ like(turn, offset)

@@ -76,7 +76,8 @@ class DeviceChain(Chain):
         positions = qpos.T[self._drivers] * multipliers[:, None] + offsets[:, None]
         sines = torch.where(self._sliding, positions, positions.sin())
         basis = torch.stack((torch.ones_like(positions), sines, positions.cos()), -1)
-        motions = (basis @ self._terms).unflatten(-1, (4, 4))
+        terms: Any = self._terms
+        motions = (basis @ terms).unflatten(-1, (4, 4))
         links = [torch.eye(4, dtype=qpos.dtype, device=qpos.device).expand(len(qpos), 4, 4)]
         for motion in motions:
             links.append(links[-1] @ motion)
@@ -85,7 +86,8 @@ class DeviceChain(Chain):
     def _ways(self, links: Tensor, errors: Tensor) -> Tensor:
         """Return the ways of the joints that may move which correct errors, (N, free)."""
         moved, last = links[1:, :, :3], links[-1, :, :3]
-        axes = (moved[..., :3] @ self._axes)[..., 0]
+        own: Any = self._axes
+        axes = (moved[..., :3] @ own)[..., 0]
         arms = torch.linalg.cross(axes, last[..., 3] - moved[..., 3])
         sliding = self._sliding[..., None]
         both = torch.stack((torch.where(sliding, axes, arms), torch.where(sliding, 0.0, axes)), 2)
@@ -135,7 +137,7 @@ class DeviceTcp(TcpController):
         """Let the targets of some worlds be where the TCPs are."""
         now = torch.stack(self._present(state), 1)
         before: Any = self.targets if len(self.targets) == len(now) else now
-        self.targets = torch.where(beside(where, now), now, before)
+        vars(self)["targets"] = torch.where(beside(where, now), now, before)
 
     def sent(self, action: Any, scaled: Any, state: DeviceState) -> Tensor:
         """Return the joints to which an action sends a group, or those that it has, (N, joints).
@@ -147,7 +149,7 @@ class DeviceTcp(TcpController):
         """
         wanted = self._asked(action, scaled, state)
         if self.tool.group.target:
-            self.targets = torch.stack(wanted, 1)  # pyright: ignore[reportAttributeAccessIssue]
+            vars(self)["targets"] = torch.stack(wanted, 1)
         place = torch.stack(self._at_link(wanted, state), 1).double()
         pose = torch.zeros((len(place), 4, 4), dtype=place.dtype, device=place.device)
         pose[:, :3, :3], pose[:, :3, 3] = rotation_matrix(place[:, 3:]), place[:, :3]
@@ -155,7 +157,8 @@ class DeviceTcp(TcpController):
         joints: Any = state.joint_positions
         found, arrived = self._chain.follow(pose, joints[:, self.tool.own].double())
         own = slice(
-            self.tool.joints.start - self.tool.own.start, self.tool.joints.stop - self.tool.own.start
+            self.tool.joints.start - self.tool.own.start,
+            self.tool.joints.stop - self.tool.own.start,
         )
         present = joints[:, self.tool.joints]
         return torch.where(arrived[:, None], found[:, own].float(), present)
@@ -252,4 +255,6 @@ def _turn_vector(turns: Tensor) -> Tensor:
     sine = torch.linalg.vector_norm(twice, dim=1, keepdim=True) / 2
     cosine = (turns.diagonal(dim1=1, dim2=2).sum(1, keepdim=True) - 1) / 2
     small = sine < _SMALL
-    return twice * torch.where(small, 0.5, torch.atan2(sine, cosine) / torch.where(small, 1.0, 2 * sine))
+    return twice * torch.where(
+        small, 0.5, torch.atan2(sine, cosine) / torch.where(small, 1.0, 2 * sine)
+    )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,47 +15,70 @@ from torch import Tensor
 from robot_layouts.simulation.backend import Pair, Readout, Velocity
 from robot_layouts.simulation.mujoco.library import mujoco
 from robot_layouts.simulation.mujoco.world import MujocoWorld
+from robot_layouts.simulation.mujoco_warp.arrays import beside
 from robot_layouts.simulation.mujoco_warp.contacts import ForceReader
-from robot_layouts.simulation.mujoco_warp.linkages import LinkageDrives
 from robot_layouts.simulation.mujoco_warp.library import mujoco_warp, warp
+from robot_layouts.simulation.mujoco_warp.linkages import LinkageDrives
 from robots import SimulationError
 
 # Room for contacts in each world: as many as at its start, as many as hands add, and as many again.
 _CONTACTS = 48
 _AXES = 3  # constraints of a contact
+_STATE = ("qpos", "mocap_pos", "mocap_quat")
 _NO_ROOM = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
 
 
-class Starts(NamedTuple):
-    """How episodes begin, a row for each.
+# What of a model a variation changes; see `MujocoWorld.vary`.
+_VARIED = (
+    *("actuator_acc0", "actuator_biasprm", "body_gravcomp", "body_inertia", "body_invweight0"),
+    *("body_mass", "body_pos", "body_quat", "body_subtreemass", "dof_invweight0"),
+    *("geom_friction", "pair_friction"),
+)
+
+
+@dataclass(frozen=True)
+class Starts:
+    """How episodes begin.
 
     Attributes:
-        qpos: Positions in MuJoCo's order, (K, nq).
-        mocap_pos: Places of bodies that physics does not move, (K, bodies, 3) (m).
-        mocap_quat: How these are turned, wxyz, (K, bodies, 4).
+        rows: By MuJoCo's name, what a world begins with, a row for each, (K, …): of its state
+            ``qpos``, ``mocap_pos`` and ``mocap_quat``, and of its model what varies.
     """
 
-    qpos: Tensor
-    mocap_pos: Tensor
-    mocap_quat: Tensor
+    rows: Mapping[str, Tensor]
 
     @classmethod
     def of(cls, worlds: Iterable[MujocoWorld], device: torch.device) -> Starts:
         """Return how worlds of MuJoCo's stand, each looked at before the next is asked for."""
-        rows = [
-            (data.qpos.copy(), data.mocap_pos.copy(), data.mocap_quat.copy())
-            for data in (world.data for world in worlds)
+        found = [
+            {name: np.array(getattr(world.data, name), np.float32) for name in _STATE}
+            | {name: np.array(getattr(world.model, name), np.float32) for name in _VARIED}
+            for world in worlds
         ]
-        columns = (np.array(own, np.float32) for own in zip(*rows, strict=True))
-        return cls(*(torch.from_numpy(own).to(device) for own in columns))
+        return cls(
+            {
+                name: torch.from_numpy(np.stack([row[name] for row in found])).to(device)
+                for name in (*_STATE, *_VARIED)
+            }
+        )
+
+    def without_constants(self, model: Any) -> Starts:
+        """Return them without what is in all of them as it is in MuJoCo's model."""
+
+        def varies(name: str) -> bool:
+            usual = torch.from_numpy(np.array(getattr(model, name), np.float32))
+            return bool((self.rows[name] != usual.to(self.rows[name].device)).any())
+
+        kept = {name: own for name, own in self.rows.items() if name in _STATE or varies(name)}
+        return Starts(kept)
 
     def and_then(self, more: Starts) -> Starts:
         """Return these, and others after them."""
-        return Starts(*(torch.cat(both) for both in zip(self, more, strict=True)))
+        return Starts({name: torch.cat((own, more.rows[name])) for name, own in self.rows.items()})
 
     def take(self, rows: Tensor) -> Starts:
         """Return some of them, by their numbers."""
-        return Starts(*(own[rows] for own in self))
+        return Starts({name: own[rows] for name, own in self.rows.items()})
 
 
 class DeviceWorlds:
@@ -66,21 +90,29 @@ class DeviceWorlds:
     """
 
     def __init__(
-        self, world: MujocoWorld, count: int, device: torch.device, contacts: int | None = None
+        self,
+        world: MujocoWorld,
+        starts: Starts,
+        count: int,
+        *,
+        contacts: int | None = None,
+        deterministic: bool = False,
     ) -> None:
-        """Put a world of MuJoCo's on a device, so many times.
+        """Put a world of MuJoCo's on the device that its starts are on, so many times.
 
         Args:
             world: It.
+            starts: How episodes begin there, which says what varies.
             count: How many worlds there are to be.
-            device: Where.
             contacts: How many contacts there is room for in each; None for enough for hands.
+            deterministic: Whether a card adds in the same order whenever it does the same again.
 
         Raises:
             SimulationError: If the device has not memory enough, or MuJoCo Warp lacks what the
                 model needs.
         """
-        self.count, self.device = count, device
+        self.count, self.device = count, starts.rows["qpos"].device
+        device = self.device
         self._index, self._declared = world.index, world.declared
         self._host = model = copy.copy(world.model)
         model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # unknown there
@@ -88,13 +120,18 @@ class DeviceWorlds:
         room = 2 * _contacts_at(world) + _CONTACTS if contacts is None else contacts
         rows = _AXES * room + model.nv + 6 * model.neq + int((model.dof_frictionloss > 0).sum())
         with _expecting_room(count, device), warp.ScopedDevice(self._warp_device):
-            self._model = mujoco_warp.put_model(model)
+            varied = [name for name in starts.rows if name not in _STATE]
+            self._model = mujoco_warp.put_model(model, dict.fromkeys(varied, count))
             self._model.opt.warn_overflow = 0  # it is in `overflowed`
+            if deterministic:
+                self._model.opt.deterministic = int(mujoco_warp.DeterminismType.ALL)
             self._data = mujoco_warp.make_data(model, count, nconmax=room, njmax=rows)
         view = warp.to_torch
         data = self._data
         self._qpos, self._qvel, self._ctrl = view(data.qpos), view(data.qvel), view(data.ctrl)
-        self._mocap = view(data.mocap_pos), view(data.mocap_quat)
+        self._owners = {name: view(getattr(data, name)) for name in _STATE}
+        self._owners |= {name: view(getattr(self._model, name)) for name in varied}
+        self._mocap = self._owners["mocap_pos"], self._owners["mocap_quat"]
         self._bodies = view(data.xpos), view(data.xquat)
         self._overflow = view(data.overflow)
         self._full = sum(int(getattr(mujoco_warp.OverflowType, name)) for name in _NO_ROOM)
@@ -142,11 +179,10 @@ class DeviceWorlds:
             where: Which, (N,) bool.
             starts: How each would, N rows.
         """
-        column = where[:, None]
-        self._qpos.copy_(torch.where(column, starts.qpos, self._qpos))
-        self._qvel.copy_(torch.where(column, torch.zeros_like(self._qvel), self._qvel))
-        for own, rows in zip(self._mocap, starts[1:], strict=True):
-            own.copy_(torch.where(column[:, :, None], rows, own))
+        for name, rows in starts.rows.items():
+            own = self._owners[name]
+            own.copy_(torch.where(beside(where, rows), rows, own))
+        self._qvel.masked_fill_(where[:, None], 0.0)
         self._overflow.masked_fill_(where, 0)
         self._touched &= ~where
         self._located = False
@@ -161,7 +197,10 @@ class DeviceWorlds:
         """
         model, number = self._host, self._index.body(None, body)
         if (held := model.body_mocapid[number]) >= 0:
-            owners = [(self._mocap[0][:, held], pose[:, :3]), (self._mocap[1][:, held], pose[:, 3:])]
+            owners = [
+                (self._mocap[0][:, held], pose[:, :3]),
+                (self._mocap[1][:, held], pose[:, 3:]),
+            ]
         else:
             at = model.jnt_qposadr[model.body_jntadr[number]]
             owners = [(self._qpos[:, at : at + 7], pose)]
@@ -248,7 +287,7 @@ class DeviceWorlds:
                 warp.capture_launch(graph)
 
     @contextmanager
-    def _in_turn(self) -> Iterator[None]:
+    def _in_turn(self) -> Generator[None]:
         """Let what Warp does come after what torch did before, and before what it does next."""
         with warp.ScopedDevice(self._warp_device):
             if self.device.type == "cpu":
@@ -269,7 +308,7 @@ def _contacts_at(world: MujocoWorld) -> int:
 
 
 @contextmanager
-def _expecting_room(count: int, device: torch.device) -> Iterator[None]:
+def _expecting_room(count: int, device: torch.device) -> Generator[None]:
     """Say what to do where a device has too little memory for so many worlds."""
     try:
         yield
