@@ -68,7 +68,7 @@ class DeviceControl(ModeController):
         present: Any = state.joint_positions
         before: Any = self.targets
         from_target: Any = self._from_target
-        base = torch.where(from_target, before, present) if self._any_target else present
+        base: Any = torch.where(from_target, before, present) if self._any_target else present
         targets: Any = self._positions.targets(action, base)
         scaled = self._in_units(action)
         for arm in self._arms.values():
