@@ -16,7 +16,7 @@ from robot_layouts.data.comparison import compare
 from robot_layouts.experts import find_expert, list_experts
 from robot_layouts.simulation.backend import SIMULATORS
 from robots import RobotLayoutsError
-from tasks import TaskEnv, make
+from tasks import TaskEnv, get_task_class, make
 
 
 def engines(
@@ -34,7 +34,7 @@ def engines(
     """
     torch.set_num_threads(1)
     record = read_record(out, versions={}, episodes={})
-    for task in tqdm(list_experts() if tasks is None else tasks, disable=None):
+    for task in tqdm(_of_the_library() if tasks is None else tasks, disable=None):
         seen = record["episodes"].setdefault(task, {})
         missing = [seed for seed in range(seeds) if str(seed) not in seen]
         envs = {name: make(task, simulator=name, obs_mode="none") for name in SIMULATORS}
@@ -52,7 +52,7 @@ def engines(
         if episode["reason"]
     ]
     shown = table(heads, rows)
-    untried = ", ".join(task for task in list_experts() if task not in record["episodes"])
+    untried = ", ".join(task for task in _of_the_library() if task not in record["episodes"])
     write_page(
         out,
         "engines",
@@ -62,6 +62,11 @@ def engines(
         untried=untried,
     )
     return 0
+
+
+def _of_the_library() -> list[str]:
+    """Return the tasks with an expert but for those that a program has added."""
+    return [task for task in list_experts() if get_task_class(task).__module__.startswith("tasks.")]
 
 
 def _played(task: str, envs: dict[str, TaskEnv], seed: int) -> dict[str, Any]:

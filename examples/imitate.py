@@ -35,6 +35,7 @@ import tasks
 from layouts import Layout
 from robot_layouts.core.progress import Progress
 from robot_layouts.data import Evaluation, evaluate, record
+from robot_layouts.data.log import HOW, Log, opened_log
 from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.kinematics.rotations import rotation_of
 from robots import RobotLayoutsError, TaskError
@@ -407,8 +408,8 @@ class Training:
         self.curve = state["curve"]
 
 
-def learn(training: Training, policy: ClonedPolicy, examined: int, file: Path) -> None:
-    """Learn all steps; examine the policy and keep everything now and then."""
+def learn(training: Training, policy: ClonedPolicy, examined: int, file: Path, log: Log) -> None:
+    """Learn all steps; examine the policy, log that and keep everything now and then."""
     recipe, every = policy.recipe, -(-policy.recipe.steps // policy.examinations)
     with Progress(recipe.steps, "batches") as line:
         while training.steps < recipe.steps:
@@ -418,6 +419,7 @@ def learn(training: Training, policy: ClonedPolicy, examined: int, file: Path) -
                 found = policy.examine(EXAMINED_SEED, examined, lambda _: None)
                 line.say(training.note(found.success_rate))
                 training.save(file)
+                log(training.steps, {"error": training.curve[-1][1], "success": found.success_rate})
 
 
 def draw(curve: Sequence[tuple[int, float, float]], title: str, path: Path) -> None:
@@ -435,7 +437,7 @@ def draw(curve: Sequence[tuple[int, float, float]], title: str, path: Path) -> N
 
 
 def imitate(
-    recipe: Recipe, options: argparse.Namespace, out: Path, policies: type[ClonedPolicy]
+    recipe: Recipe, options: argparse.Namespace, out: Path, policies: type[ClonedPolicy], log: Log
 ) -> Evaluation:
     """Record, learn, and play the test seeds; leave weights, curve and numbers in a folder."""
     torch.set_num_threads(1)  # several would add up in other orders
@@ -447,7 +449,7 @@ def imitate(
     training = policies.training(recipe, recording, options.workers, out)
     if file.exists():
         training.load(file)
-    learn(training, policies(recipe, training.network), options.examined, file)
+    learn(training, policies(recipe, training.network), options.examined, file, log)
     policy = policies.load(file)
     with Progress(options.tests, "episodes") as line:
         result = policy.examine(TEST_SEED, options.tests, lambda _: line.advance(1, "examining"))
@@ -499,13 +501,15 @@ def main(
     add("--workers", type=int, help="processes that record (default: one per core)")
     add("--recording", type=Path, help="a recording that is there: folder, or hub:OWNER/NAME")
     add("--out", type=Path, help=f"folder (default: runs/{name}/TASK)")
+    add("--log", help=f"also log the curve: {HOW}")
     options = parser.parse_args(arguments)
     sys.path.append(os.getcwd())  # for MODULE:ID of the present folder
     fields = ("task", "episodes", "steps", "seed", *usual.options)
     recipe = policies.recipes(**{name: getattr(options, name) for name in fields})
     out = options.out or Path("runs") / name / options.task.rpartition(":")[2]
     try:
-        result = imitate(recipe, options, out, policies)
+        with opened_log(options.log) as log:
+            result = imitate(recipe, options, out, policies, log)
     except RobotLayoutsError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

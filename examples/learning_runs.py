@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from robot_layouts.core.progress import Progress
 from robot_layouts.core.writing import PARTIAL, remove, write_whole, written_whole
 from robot_layouts.data import evaluate
+from robot_layouts.data.log import HOW, Log, opened_log
 from robots import RobotLayoutsError, TaskError
 from tasks.episode import Policy
 
@@ -184,7 +185,9 @@ def first_seed(options: argparse.Namespace, number: int) -> int:
     return LEARN_SEED + options.seed * SEEDS_OF_A_RUN + number * options.envs
 
 
-def learn(learner: Learner, run: Run, steps: int, tests: int) -> list[Point]:
+def learn(
+    learner: Learner, run: Run, steps: int, tests: int, log: Log = lambda step, numbers: None
+) -> list[Point]:
     """Learn from the newest checkpoint on, or from the beginning, and return the whole curve.
 
     Args:
@@ -192,6 +195,7 @@ def learn(learner: Learner, run: Run, steps: int, tests: int) -> list[Point]:
         run: Where checkpoints are kept.
         steps: Steps to learn from in all; rounded up to whole checkpoints.
         tests: Test episodes at each checkpoint.
+        log: Takes the numbers of each.
     """
     for unfinished in run.folder.glob(f"checkpoint-*{PARTIAL}"):
         remove(unfinished)
@@ -203,7 +207,9 @@ def learn(learner: Learner, run: Run, steps: int, tests: int) -> list[Point]:
     done = int(run.latest.name.rpartition("-")[2])
     with Progress(steps) as line:
         for number in range(done, -(-steps // learner.segment)):
-            line.say(_told(_next(learner, run, number, tests, line)))
+            point = _next(learner, run, number, tests, line)
+            line.say(_told(point))
+            log(point.steps, {n: v for n, v in asdict(point).items() if n != "steps"})
     return run.curve
 
 
@@ -272,6 +278,7 @@ def read_arguments(
     add("--threads", type=int, default=1, help="threads that learn (default %(default)s)")
     add("--seed", type=int, default=0, help="of weights and episodes (default %(default)s)")
     add("--out", type=Path, default=Path(folder), help="folder of the run (default %(default)s)")
+    add("--log", help=f"also log the curve: {HOW}")
     add("--beside", type=Path, nargs="*", default=[], help="other runs to draw curves of")
     sys.path.append(os.getcwd())  # for MODULE:ID of the present folder
     return parser.parse_args(arguments)
@@ -301,8 +308,8 @@ def main(
                 "processor": torch.backends.cpu.get_cpu_capability(),
             }
         )
-        with closing(make()) as learner:
-            curve = learn(learner, run, options.steps, options.tests)
+        with opened_log(options.log) as log, closing(make()) as learner:
+            curve = learn(learner, run, options.steps, options.tests, log)
         beside = {other.name: Run(other).curve for other in options.beside}
     except RobotLayoutsError as error:
         print(f"error: {error}", file=sys.stderr)

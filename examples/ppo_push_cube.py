@@ -31,6 +31,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 import tasks
 from robot_layouts.core.progress import Progress
+from robot_layouts.data.log import HOW, Log, opened_log
 from robots import RobotLayoutsError
 
 TASK = "PushCube-v1"
@@ -78,11 +79,11 @@ class Examiner(BaseCallback):
         curve: What it found, in order.
     """
 
-    def __init__(self, env: VecEnv, line: Progress) -> None:
-        """Take the environments to examine it in, one per test seed, and the line to tell on."""
+    def __init__(self, env: VecEnv, line: Progress, log: Log) -> None:
+        """Take the environments to examine it in, one per test seed, and where to say how it is."""
         super().__init__()
         self.curve: list[Examination] = []
-        self._env, self._line = env, line
+        self._env, self._line, self._log = env, line, log
         self._learned, self._since = 0.0, 0.0
 
     def _on_training_start(self) -> None:
@@ -101,6 +102,7 @@ class Examiner(BaseCallback):
         self._learned += time.perf_counter() - self._since
         found = examine(self.model, self._env, self.num_timesteps, round(self._learned, 1))
         self.curve.append(found)
+        self._log(found.steps, {n: v for n, v in asdict(found).items() if n != "steps"})
         self._line.say(
             f"{found.steps:>7} steps  {found.seconds:>5.0f} s  success {found.success:>4.0%}"
             f"  reward {found.reward:.2f}"
@@ -140,9 +142,14 @@ def learn(options: argparse.Namespace) -> list[Examination]:
 
     torch.set_num_threads(options.threads)
     line = Progress(options.steps)
-    with closing(make(options.envs)) as env, closing(make(options.tests)) as tests, line:
+    with (
+        opened_log(options.log) as log,
+        closing(make(options.envs)) as env,
+        closing(make(options.tests)) as tests,
+        line,
+    ):
         tests.training, tests.obs_rms = False, env.obs_rms
-        examiner = Examiner(tests, line)
+        examiner = Examiner(tests, line, log)
         rate = LinearSchedule(LEARNING_RATE, 0.0, 1.0)
         model = PPO("MlpPolicy", env, rate, seed=options.seed, device="cpu", **HYPERPARAMETERS)
         model.learn(options.steps, callback=examiner)
@@ -187,6 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--threads", type=int, default=1, help="threads that learn (default %(default)s)")
     add("--seed", type=int, default=0, help="of the policy and of the episodes (default 0)")
     add("--out", type=Path, default=Path("runs/ppo_push_cube"), help="folder (default %(default)s)")
+    add("--log", help=f"also log the curve: {HOW}")
     options = parser.parse_args(arguments)
     options.out.mkdir(parents=True, exist_ok=True)
     try:

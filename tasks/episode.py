@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from robots import TaskError
 from tasks import TaskEnv
 from tasks.arrays import row_of, stacked
+from tasks.language.stages import STAGE_SCORE
 
 States = dict[str, dict[str, NDArray[np.float32]]]
 
@@ -46,6 +47,8 @@ class Score:
         steps: Its control steps.
         reason: Why it failed, in words, if that is known; of an expert, it is.
         waits: How long each answer of its policy's server took (s); empty if none serves it.
+        stage_score: That of the last stage it passed, 0 to 1; None of a task without stages, or if
+            it took no step.
     """
 
     success: bool
@@ -53,6 +56,7 @@ class Score:
     steps: int
     reason: str = field(default="", compare=False)
     waits: tuple[float, ...] = field(default=(), compare=False)
+    stage_score: float | None = None
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,7 @@ class PlayedEpisode(Episode):
         reason: Why it failed; empty if it did not, or if that is unknown. Experts give a reason.
         observations: What was observed after the reset and every step, (T + 1, …), or nested
             mappings of that; None if it was not kept.
+        stage_score: See `Score`.
     """
 
     states: States
@@ -89,6 +94,7 @@ class PlayedEpisode(Episode):
     corrections: NDArray[np.float32] | None = None
     reason: str = ""
     observations: Any = None
+    stage_score: float | None = None
 
     @classmethod
     def of(
@@ -117,6 +123,7 @@ class PlayedEpisode(Episode):
             terminated=np.array([moment.terminated for moment in moments]),
             truncated=np.array([moment.truncated for moment in moments]),
             seconds=fsum(moment.seconds for moment in moments),
+            stage_score=moments[-1].stage_score,
             **others,
         )
 
@@ -129,7 +136,8 @@ class PlayedEpisode(Episode):
     def score(self) -> Score:
         """How it went."""
         total = fsum(self.rewards.tolist())
-        return Score(self.solved, total, len(self.actions), self.reason)
+        steps, stage = len(self.actions), self.stage_score
+        return Score(self.solved, total, steps, self.reason, stage_score=stage)
 
 
 class StepResult(NamedTuple):
@@ -143,6 +151,7 @@ class StepResult(NamedTuple):
         truncated: Whether its time was over.
         seconds: Time that the step took (s).
         elapsed: Control steps since the reset.
+        stage_score: That of the last stage passed; None of a task without stages.
     """
 
     observation: Any
@@ -152,6 +161,7 @@ class StepResult(NamedTuple):
     truncated: bool = False
     seconds: float = 0.0
     elapsed: int = 0
+    stage_score: float | None = None
 
 
 def moments(
@@ -202,7 +212,8 @@ def take_step(task: TaskEnv, action: Any) -> StepResult:
     seconds = perf_counter() - began
     success, over, late = bool(info["success"]), bool(terminated), bool(truncated)
     elapsed = int(info["elapsed_steps"])
-    return StepResult(observation, reward.item(), success, over, late, seconds, elapsed)
+    stage = info[STAGE_SCORE].item() if STAGE_SCORE in info else None
+    return StepResult(observation, reward.item(), success, over, late, seconds, elapsed, stage)
 
 
 def open_loop(actions: Iterable[Any]) -> Policy:

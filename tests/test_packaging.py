@@ -117,6 +117,7 @@ class TestDependencies:
             "light",
             "video",
             "export",
+            "log",
             "mjcf",
             "motion",
             "pettingzoo",
@@ -124,6 +125,7 @@ class TestDependencies:
             "sb3",
             "served",
             "usd",
+            "wandb",
             "xacro",
         ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])

@@ -45,6 +45,12 @@ def test_a_simulator_needs_no_other(simulator):
 
 
 @pytest.mark.long
+def test_the_demo_plays_and_films_without_sapien(tmp_path):
+    found = in_fresh_process(without.demo, str(tmp_path))
+    assert found == ["layout.png", "trajectory.h5", "trajectory.json", "video.mp4"]
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("system", without.LACKING)
 def test_one_process_does_on_other_systems_what_it_does_here(system, tmp_path):
     found = in_fresh_process(without.on, system, str(tmp_path))

@@ -10,6 +10,7 @@ import os
 import pkgutil
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 from types import ModuleType
 
 ROOMS = ("robots", "objects", "layouts", "tasks", "robot_layouts")
@@ -133,6 +134,19 @@ def play(hidden: tuple[str, ...], simulator: str) -> float:
     env.reset(seed=0)
     env.action_space.seed(0)
     return sum(float(env.step(env.action_space.sample())[1][0]) for _ in range(5))
+
+
+def demo(folder: str) -> list[str]:
+    """Let an expert that tries grasps in physics play where SAPIEN is missing; return the files."""
+    hide("sapien")
+    from rich.console import Console
+
+    from robot_layouts.data.demo import DemoOptions, run_demo
+    from tasks.cell_options import CellOptions
+
+    cell, out = CellOptions(simulator="mujoco"), Path(folder)
+    run_demo(DemoOptions(task="TwoRobotHandOver-v1", seeds=1, out=out, cell=cell), Console())
+    return sorted(file.name for file in out.iterdir())
 
 
 def refusal(simulator: str, package: str) -> str:

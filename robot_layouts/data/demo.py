@@ -70,9 +70,12 @@ def run_demo(options: DemoOptions, console: Console) -> bool:
     expert = find_expert(options.task)
     cls = tasks.get_task_class(options.task)
     making = options.cell.making()
-    layout = make_scenario(cls, **making).layout
+    scenario = make_scenario(cls, **making)
+    layout = scenario.layout
     console.print(f"[bold]{options.task}[/], {plural(options.seeds, 'seed')}", highlight=False)
-    film_why_not = "not asked for" if options.no_video else _pictures_problem(layout)
+    film_why_not = (
+        "not asked for" if options.no_video else _pictures_problem(layout, scenario.simulator)
+    )
     _find_files(layout, console)
     task = tasks.make(options.task, obs_mode="state", **making)
     _show_layout(layout, options.out, console)
@@ -114,9 +117,9 @@ def _find_files(layout: Layout, console: Console) -> None:
         )
 
 
-def _pictures_problem(layout: Layout) -> str | None:
+def _pictures_problem(layout: Layout, simulator: str) -> str | None:
     """Say why no video can be made, or fetch what the robots look like and return None."""
-    problem = video_problem()
+    problem = video_problem(simulator)
     if problem is not None:
         return problem
     try:

@@ -77,6 +77,17 @@ class Evaluation:
         return {seed: score.reason for seed, score in self.scores.items() if score.reason}
 
     @property
+    def stage_scores(self) -> dict[int, float]:
+        """Seed → score of the last stage that the episode passed; empty of a task without stages.
+
+        An episode of no steps has passed none.
+        """
+        found = {seed: score.stage_score for seed, score in self.scores.items()}
+        if all(score is None for score in found.values()):
+            return {}
+        return {seed: score or 0.0 for seed, score in found.items()}
+
+    @property
     def waits(self) -> tuple[float, ...]:
         """How long each answer of the policy's server took (s); empty if none serves it."""
         return tuple(wait for score in self.scores.values() for wait in score.waits)
@@ -95,6 +106,10 @@ class Evaluation:
             "on average: return {:.2f} ({:.4g} to {:.4g})".format(*_spread(self.returns))
             + ", {:.1f} steps ({} to {})".format(*_spread(self.lengths)),
         ]
+        if self.stage_scores:
+            lines[-1] += ", stage score {:.2f} ({:.2f} to {:.2f})".format(
+                *_spread(self.stage_scores)
+            )
         return "\n".join([*lines, *wait_lines(self.waits), *seed_lines("no success", failed)])
 
 
@@ -195,7 +210,7 @@ def evaluate(
     written = receipt_of(described, job, {seed: found[seed] for seed in seeds})
     written.write(receipt)
     scores = {
-        e.seed: Score(e.success, e.total, e.steps, e.reason, found[e.seed].waits)
+        e.seed: Score(e.success, e.total, e.steps, e.reason, found[e.seed].waits, e.stage_score)
         for e in written.episodes
     }
     return Evaluation(cls.task_id, _name(cast), scores, written)

@@ -129,6 +129,7 @@ def evaluate(
     receipt: Annotated[Path, Word("JSON")] | None = None,
     picture_interval: Count = 1,
     keep_pictures: bool = False,
+    log: Annotated[str, Word("tensorboard:DIR|wandb:PROJECT")] | None = None,
     acting: Acting,
     cell: CellOptions,
 ) -> None:
@@ -145,6 +146,7 @@ def evaluate(
         receipt: Write a receipt, which `verify` plays again.
         picture_interval: The receipt has a digest of the pictures of each so many-th step.
         keep_pictures: Keep these pictures, in a folder beside the receipt.
+        log: Log each episode as it ends, for TensorBoard or Weights & Biases.
         acting: Who acts, and how.
         cell: The task's robots, and what varies.
 
@@ -153,16 +155,23 @@ def evaluate(
     """
     from robot_layouts.core.progress import Progress
     from robot_layouts.data import evaluation
+    from robot_layouts.data.log import opened_log
 
     executor, line, solved = players.executor(), Progress(episodes, "episodes"), Counter[bool]()
 
-    def show(event: Event) -> None:
-        tell(line, event)
-        if event.result is not None:
-            solved[event.result.success] += 1
-        line.update(solved.total(), f"evaluating (succeeded so far: {solved[True]})")
+    with stoppable(), opened_log(log) as add, line:
 
-    with stoppable(), line:
+        def show(event: Event) -> None:
+            tell(line, event)
+            if (score := event.result) is not None:
+                solved[score.success] += 1
+                success = solved[True] / solved.total()
+                numbers = {"success": success, "return": score.total, "steps": score.steps}
+                if score.stage_score is not None:
+                    numbers["stage_score"] = score.stage_score
+                add(solved.total(), numbers)
+            line.update(solved.total(), f"evaluating (succeeded so far: {solved[True]})")
+
         found = evaluation.evaluate(
             task=task,
             seeds=range(seed, seed + episodes),
@@ -238,6 +247,7 @@ def verify(
     task: Annotated[str, Word("MODULE:ID")] | None = None,
     robots: Sequence[PlacedRobot] = (),
     num_envs: Count = 1,
+    episodes: Count | None = None,
     pictures: Annotated[Path, Word("DIR")] | None = None,
     players: Players,
 ) -> int:
@@ -254,6 +264,7 @@ def verify(
         task: The task, if no installed package lists it.
         robots: Which robots these were, where the receipt cannot say it.
         num_envs: Episodes that play at once.
+        episodes: Play N of them alone, drawn at random (all).
         pictures: Where to write pictures that differ (the folder NAME.differences beside the
             receipt).
         players: Who plays.
@@ -270,7 +281,8 @@ def verify(
     known = chosen_robots(robots) if robots else {}
     if isinstance(known, RobotDescriptor):
         known = dict.fromkeys(read.making["layout"], known)
-    executor, line = players.executor(), Progress(len(read.episodes), "episodes")
+    total = min(len(read.episodes), episodes or len(read.episodes))
+    executor, line = players.executor(), Progress(total, "episodes")
     states = {episode.seed: episode.states for episode in read.episodes}
     equal = Counter[bool]()
 
@@ -283,7 +295,14 @@ def verify(
 
     with stoppable(), line:
         found = verification.verify(
-            read, executor, show, policy=policy, task=task, robots=known, num_envs=num_envs
+            read,
+            executor,
+            show,
+            policy=policy,
+            task=task,
+            robots=known,
+            num_envs=num_envs,
+            episodes=episodes,
         )
     print(printable(repr(found)))
     verdict = "equal: this is" if found.equal else "not equal: this is not"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.writing import PARTIAL, written_whole
-from robot_layouts.simulation.rendering import Cameras, vulkan_problem
+from robot_layouts.simulation.rendering import Cameras, drawing_problem
 from robots import MissingPackageError, RecordingError
 from tasks import TaskEnv
 from tasks.engine.columns import overview
@@ -27,9 +27,9 @@ STILL_FRAMES = 12  # of the last picture of an episode, before the next begins
 INSTALL = "pip install 'robot-layouts[video]'"
 
 
-def video_problem() -> str | None:
-    """Say in a few words why no video can be made here, or return None."""
-    return package_problem() or vulkan_problem()
+def video_problem(simulator: str) -> str | None:
+    """Say in a few words why a simulator's pictures make no video here, or return None."""
+    return package_problem() or drawing_problem(simulator)
 
 
 def package_problem() -> str | None:

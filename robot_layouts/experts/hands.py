@@ -131,7 +131,7 @@ class Hand:
         self._aiming = [robot.joints.index(joint) for joint in aiming_joints(robot, own)]
         few = len(self._aiming) < FULL
         self._turn, self._worth = (ROUGH_TURN, TURN_WORTH) if few else (TURN, 1.0)
-        seconds = 1 / task.scenario.control_frequency
+        self._simulator, seconds = task.scenario.simulator, 1 / task.scenario.control_frequency
         self.quick = all(
             np.min(group.stiffness) * seconds > QUICK * np.max(group.damping)
             for name, group in own.action_split.groups.items()
@@ -151,7 +151,7 @@ class Hand:
         Raises:
             RobotLayoutsError: If the robot cannot be built.
         """
-        return _grip(self._robot, self._limb, round(side, 6), depth, firmness)
+        return _grip(self._robot, self._limb, round(side, 6), depth, firmness, self._simulator)
 
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""
@@ -314,11 +314,11 @@ class Hand:
 
 @lru_cache(maxsize=64)
 def _grip(
-    robot: RobotDescriptor, limb: str, side: float, depth: float, firmness: float
+    robot: RobotDescriptor, limb: str, side: float, depth: float, firmness: float, simulator: str
 ) -> Grip | None:
     """See `Hand.grip`; the limb is what its name adds to the robot's."""
     layout = single({NAME: robot})
-    own, closing = layout.arm(NAME + limb).robot, Closing(layout, NAME + limb, side)
+    own, closing = layout.arm(NAME + limb).robot, Closing(layout, NAME + limb, side, simulator)
     motion, tree = gripper_motion(own), link_tree(robot)
     gripper = [robot.joints.index(joint) for joint in motion.joints]
     base, tcp = layout[NAME].base_pose, find_tcp(own, tree).turned

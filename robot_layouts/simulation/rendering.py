@@ -23,7 +23,8 @@ from robot_layouts.simulation.simulation import Simulation
 from robots import SimulationError
 from robots.descriptor import Vector3
 
-_PROBE = "import sapien; from sapien.render import RenderSystem; sapien.Scene([RenderSystem()])"
+_VULKAN = "import sapien; from sapien.render import RenderSystem; sapien.Scene([RenderSystem()])"
+_OPENGL = "from robot_layouts.simulation.mujoco.library import mujoco; mujoco.GLContext(8, 8)"
 _PROBE_SECONDS = 60
 
 
@@ -128,24 +129,40 @@ def _expect_visuals(simulation: Simulation) -> None:
         raise SimulationError("these worlds have nothing to draw; build them with visuals=True")
 
 
+def drawing_problem(simulator: str) -> str | None:
+    """Say in a few words why a simulator draws no pictures on this machine, or return None."""
+    return opengl_problem() if simulator == "mujoco" else vulkan_problem()
+
+
 @functools.cache
 def vulkan_problem() -> str | None:
-    """Say in a few words why no pictures can be drawn on this machine, or return None.
+    """Say in a few words why SAPIEN draws no pictures on this machine, or return None.
 
     Tried once, in a process of its own, as some drivers end the process that asks them.
     """
+    return _problem(_VULKAN, "Vulkan")
+
+
+@functools.cache
+def opengl_problem() -> str | None:
+    """Say in a few words why MuJoCo draws no pictures on this machine; see `vulkan_problem`."""
+    return _problem(_OPENGL, "OpenGL")
+
+
+def _problem(program: str, driver: str) -> str | None:
+    """Run a program that draws; say what is wrong with a driver if it cannot."""
     try:
         done = subprocess.run(
-            [sys.executable, "-c", _PROBE],
+            [sys.executable, "-c", program],
             capture_output=True,
             text=True,
             check=False,
             timeout=_PROBE_SECONDS,
         )
     except subprocess.TimeoutExpired:
-        return f"the Vulkan driver did not answer within {_PROBE_SECONDS} s"
+        return f"the {driver} driver did not answer within {_PROBE_SECONDS} s"
     if done.returncode == 0:
         return None
     lines = done.stderr.strip().splitlines()
     last = lines[-1] if lines else f"the process ended with code {done.returncode}"
-    return f"no usable Vulkan driver ({last})"
+    return f"no usable {driver} driver ({last})"

@@ -13,6 +13,7 @@ HERE = Path(__file__).parent
 CLIENTS = (
     "cleanrl",
     "inspect_robots",
+    "logs",
     "minari",
     "rllib",
     "skrl",

@@ -101,7 +101,9 @@ def test_nine_of_ten_are_enough(tmp_path, monkeypatch, console, solved, enough):
 
 
 def test_where_nothing_can_be_drawn_one_line_says_so(tmp_path, monkeypatch, console):
-    monkeypatch.setattr(demo, "video_problem", lambda: "no usable Vulkan driver (none found)")
+    monkeypatch.setattr(
+        demo, "video_problem", lambda simulator: "no usable Vulkan driver (none found)"
+    )
     assert run_demo(DemoOptions(seeds=1, out=tmp_path), console)
     assert "no video: no usable Vulkan driver (none found)\n" in console.export_text()
 
@@ -115,7 +117,7 @@ def test_without_visual_meshes_one_line_says_so(tmp_path, monkeypatch, console):
             raise AssetError("11 robot files cannot be used\n  sources tried: …")
         return locate(self)
 
-    monkeypatch.setattr(demo, "video_problem", lambda: None)
+    monkeypatch.setattr(demo, "video_problem", lambda simulator: None)
     monkeypatch.setattr(UrdfLocator, "locate", no_pictures)
     assert run_demo(DemoOptions(seeds=1, out=tmp_path), console)
     printed = console.export_text()
@@ -152,7 +154,7 @@ def test_a_number_of_seeds_is_one_or_more(count, capsys):
 
 @pytest.mark.long
 def test_a_video_shows_the_episodes(tmp_path, renderer):
-    if problem := video_problem():
+    if problem := video_problem("sapien3"):
         pytest.skip(problem)
     import imageio.v3 as imageio
 

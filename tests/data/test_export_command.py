@@ -17,6 +17,7 @@ import robot_layouts.data.export.drawing as pictures
 import tasks
 from layouts import Layout, Placement
 from robot_layouts.__main__ import main
+from robot_layouts.data.export import dataset
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.export.shots import choose_shots
@@ -230,7 +231,9 @@ def test_options_of_another_format_are_refused(recording, tmp_path, capsys, word
 
 
 def test_without_a_vulkan_driver_a_video_is_refused(recording, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(pictures, "vulkan_problem", lambda: "no usable Vulkan driver (none)")
+    monkeypatch.setattr(
+        dataset, "drawing_problem", lambda simulator: "no usable Vulkan driver (none)"
+    )
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out", "--video") == 1
     assert "no usable Vulkan driver (none); export without video" in capsys.readouterr().err
     assert nothing_was_left(tmp_path)

@@ -261,7 +261,7 @@ CAMERA = "observation.images.overview"
 @pytest.fixture(scope="module")
 def filmed(tmp_path_factory, renderer) -> Path:
     """Return a folder with a recording, and a dataset with video that was made of it."""
-    if problem := video_problem():
+    if problem := video_problem("sapien3"):
         pytest.skip(problem)
     folder = tmp_path_factory.mktemp("filmed")
     recording = record(folder / "recording.h5", FILMED, FRAMES)

@@ -83,7 +83,7 @@ def test_a_task_of_ones_own_is_imported_by_the_word_of_its_user(folder, capsys):
     assert console.main(["suite", "verify", "run", named, *words]) == 0
     assert "1 of 1 receipts verified" in capsys.readouterr().out
     assert console.main(["suite", "show", "suite.yaml", named]) == 0
-    assert console.main(["suite", "report", "run", named]) == 0
+    assert console.main(["suite", "report", "run", named, "--workers=0"]) == 0
 
 
 def test_no_policy_is_imported_because_a_run_names_it(folder, capsys):
@@ -102,6 +102,9 @@ def test_no_policy_is_imported_because_a_run_names_it(folder, capsys):
         " PickCube-v1 that are here, type: --policy PushT-v1=strange:policy"
         " 'PickCube-v1=strange:other; ls'\n"
     )
+    assert console.main(["suite", "report", "run", "--workers=0"]) == 1
+    _expect_untouched()
+    assert capsys.readouterr().out.startswith("not listed: run, PushCube-v1\n")
 
 
 @pytest.mark.parametrize("what", ["layout", "randomization"])

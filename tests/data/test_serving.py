@@ -13,6 +13,7 @@ from queue import Queue
 
 import numpy as np
 import pytest
+from gymnasium.spaces import Box, Dict
 from websockets.exceptions import ConnectionClosedError
 from websockets.sync.client import connect
 
@@ -20,8 +21,11 @@ import tasks
 from layouts.commands import Server
 from robot_layouts.__main__ import main
 from robot_layouts.data.playing.served.client import pack, unpack
+from robot_layouts.data.serving import client
 from robot_layouts.data.serving.client import RemoteEnv, RemoteTaskError
 from robot_layouts.data.serving.server import MOST_BYTES, Admission, serve
+from robot_layouts.data.serving.world import read_space, written_space
+from robot_layouts.simulation.rendering import vulkan_problem
 from robots import TaskError
 from tasks.interfaces.gymnasium import info_row, row
 from tests.data import expert_plays
@@ -133,12 +137,51 @@ def test_what_is_no_message_is_answered(address, data):
         assert "observation" in unpack(socket.recv(timeout=60))
 
 
-def test_a_message_of_a_megabyte_is_not_read(address):
+def test_a_message_of_a_megabyte_is_not_read(address, env):
+    env.reset(seed=0)
+    with pytest.raises(RemoteTaskError, match="a message of 1,120,0.. bytes was sent; 1,048,576 a"):
+        env.step(np.zeros((20_000, 7)))
+    env.step(np.zeros(7))
     with connect(address) as socket:
         socket.recv()
         socket.send(bytes(MOST_BYTES + 1))
         with pytest.raises(ConnectionClosedError, match="1009"):
             socket.recv(timeout=10)
+
+
+def test_messages_that_are_too_long_for_a_side_are_named(address, monkeypatch):
+    with closing(RemoteEnv(address)) as env:
+        with pytest.raises(RemoteTaskError, match="reads no message as long as that: .*16777216"):
+            env.step(np.zeros(MOST_BYTES))
+    monkeypatch.setattr(client, "MOST_BYTES", 100)
+    with pytest.raises(RemoteTaskError, match="sent a message of more than 0 MB"):
+        RemoteEnv(address)
+
+
+def test_a_space_is_as_small_as_it_can_be():
+    uneven = Box(np.array([0, 1], np.float32), np.full(2, np.inf, np.float32))
+    parts = {"rgb": Box(0, 255, (512, 512, 3), np.uint8), "none": Box(0, 1, (0,)), "two": uneven}
+    space = Dict(parts)
+    sent = pack(written_space(space))
+    assert len(sent) < 1000
+    assert read_space(unpack(sent)) == space
+
+
+@pytest.mark.long
+@pytest.mark.skipif(vulkan_problem() is not None, reason="needs a Vulkan driver")
+def test_large_pictures(renderer):
+    making = {"obs_mode": "rgb", "camera_size": (512, 512)}
+    address = start(TWO, **making)
+    with connect(address) as socket:  # which takes a megabyte
+        assert len(socket.recv()) < 10_000
+    with closing(RemoteEnv(address)) as env, closing(tasks.make(TWO, **making)) as task:
+        seen, _ = env.reset(seed=4)
+        obs, _ = task.reset(4, {"reconfigure": True})
+        assert env.observation_space.contains(seen)
+        assert len(seen["sensor_data"]) == 3
+        for name, camera in seen["sensor_data"].items():
+            assert camera["rgb"].shape == (512, 512, 3)
+            assert np.array_equal(camera["rgb"], row(obs)["sensor_data"][name]["rgb"])
 
 
 def test_only_those_with_the_token_come_in(address):

@@ -161,6 +161,28 @@ def test_a_robot_moves_as_in_sapien(mode):
     assert apart.max() < FREE_MOTION.get(mode, 0.05)
 
 
+@pytest.mark.parametrize(
+    "robot", quick_cases(("panda", "xarm7", "ur10", "fetch"), quick=("panda",))
+)
+def test_frames_are_turned_by_the_quaternions_of_sapien_also_beyond_half_a_turn(robot):
+    layout = single({"arm": robot})
+    worlds = {
+        name: Simulation(layout, lambda world, i: None, 1, simulator=name) for name in SIMULATORS
+    }
+    limits = np.nan_to_num(worlds["mujoco"].index.robots["arm"].limits, posinf=9.0, neginf=-9.0)
+    tcp = layout["arm"].robot.tcp_link
+    far = 0
+    for posture in np.random.default_rng(0).uniform(*limits.T, (20, len(limits))):
+        seen = []
+        for simulation in worlds.values():
+            stand(simulation)
+            simulation.worlds[0].stand("arm", posture)
+            seen.append(simulation.read().link_pose("arm", tcp)[0])
+        np.testing.assert_allclose(*seen, atol=1e-4)
+        far += bool((np.abs(posture) > np.pi).any())
+    assert far
+
+
 def test_two_runs_and_any_number_of_worlds_and_threads_have_the_same_bits():
     actions = np.random.default_rng(0).uniform(-1, 1, (10, 1, 16)).astype(np.float32)
     runs = []

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from layouts import Layout, Placement
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.reading.json_files import EpisodeEntry, describe_source, read_summary
-from robot_layouts.data.reading.recording import Recording, Trajectory, all_files
+from robot_layouts.data.reading.recording import Recording, all_files
 from robot_layouts.data.video import Picture, open_video, play_pictured
 from tasks import TaskEnv
 from tasks.episode import Episode
@@ -283,13 +283,23 @@ def film(
     for place, words in places.items():
         trajectory = file[place]
         if trajectory.seed is not None:
-            clips.append(Clip(place, trajectory.seed, words, *_film_one(task, trajectory)))
+            episode = Episode(trajectory.seed, trajectory.actions)
+            clips.append(Clip(place, trajectory.seed, words, *film_one(task, episode)))
         progress()
     return clips
 
 
-def _film_one(task: TaskEnv, trajectory: Trajectory) -> tuple[bytes, bytes]:
-    """Return an mp4 file's bytes, and those of a jpeg of the last picture."""
+def film_one(task: TaskEnv, episode: Episode) -> tuple[bytes, bytes]:
+    """Return an mp4 file's bytes, 256 pixels wide, and those of a jpeg of the last picture.
+
+    Args:
+        task: Made to be drawn, with one environment.
+        episode: What is shown.
+
+    Raises:
+        MissingPackageError: If imageio is not installed.
+        SimulationError: If nothing can be drawn here.
+    """
     import imageio.v2 as imageio
 
     pictures: list[Picture] = []
@@ -301,7 +311,6 @@ def _film_one(task: TaskEnv, trajectory: Trajectory) -> tuple[bytes, bytes]:
                 pictures[:] = [_halved(picture)]
                 append(pictures[0])
 
-            episode = Episode(trajectory.seed or 0, trajectory.actions)
             play_pictured(task, episode, take, STRIDE)
         video = path.read_bytes()
     poster = io.BytesIO()

@@ -314,7 +314,7 @@ def make_report(
                 near = measure(file, task, places, lambda: progress(next(done), total, "measuring"))
             if near is None and len(file.layout or {}) > 1:
                 remarks.append("Clearances need recorded states.")
-        if clips and (problem := video_problem()):
+        if clips and (problem := video_problem(file.simulator)):
             remarks.append(f"There are no clips: {problem}.")
         elif clips:
             chosen = chosen_places(contents, clips)
@@ -370,7 +370,7 @@ def report(
         file: The folder of a recording, or one h5 file.
         out: The HTML file.
         clearances: Measure in N episodes how near robots came; needs the extra checks.
-        clips: Film N episodes; needs Vulkan and the extra video.
+        clips: Film N episodes; needs a graphics driver and the extra video.
         task: The recording's task; MODULE:ID for one of your own.
         cell: Which robots stood where, where the recording cannot say it.
 

@@ -41,7 +41,14 @@ from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.data.recording.disk import claim
-from robots import MissingPackageError, RecordingError, TaskError, UnknownNameError
+from robot_layouts.simulation.rendering import drawing_problem
+from robots import (
+    MissingPackageError,
+    RecordingError,
+    SimulationError,
+    TaskError,
+    UnknownNameError,
+)
 from tasks.description import instruction_of
 from tasks.engine.cameras import checked_size
 from tasks.engine.columns import OVERVIEW
@@ -126,8 +133,8 @@ class ExportOptions:
 
     Attributes:
         fps: Steps per second to state (default: the task's, 20; lerobot).
-        video: Draw every step as well, as videos (lerobot; needs Vulkan): what the overview sees,
-            unless cameras are named.
+        video: Draw every step as well, as videos (lerobot; needs a graphics driver): what the
+            overview sees, unless cameras are named.
         images: Write png images, which lose nothing, in place of videos (lerobot).
         depth: Write the cameras' depth as well (mm, 16 bits; for lerobot always as png images).
         size: Width and height of the pictures in pixels (each camera's own).
@@ -184,17 +191,13 @@ class Export(ExportOptions):
             return (OVERVIEW,) if self.video else ()
         return (self.cameras,) if isinstance(self.cameras, str) else tuple(self.cameras)
 
-    def check(self, *, here: bool = True) -> None:
+    def check(self) -> None:
         """Refuse what cannot be done.
-
-        Args:
-            here: Whether this machine draws the pictures; others say themselves if they cannot.
 
         Raises:
             UnknownNameError: If there is no such format.
             TaskError: If options do not go together.
             MissingPackageError: If a package that they need is not installed.
-            SimulationError: If there is no Vulkan driver to draw pictures with.
             RecordingError: If the folder holds something already.
         """
         if self.format not in FORMATS:
@@ -206,7 +209,7 @@ class Export(ExportOptions):
         if self.format == "robomimic":
             self._expect_robomimic()
         self._expect_points()
-        self._expect_pictures(here=here)
+        self._expect_pictures()
         refuse_used(Path(self.out))
 
     def _expect_robomimic(self) -> None:
@@ -230,7 +233,7 @@ class Export(ExportOptions):
                 " robomimic, or take point_cloud of the recording's observations"
             )
 
-    def _expect_pictures(self, *, here: bool) -> None:
+    def _expect_pictures(self) -> None:
         names = self.camera_names
         if not all(isinstance(name, str) for name in names):
             raise TaskError(f"cameras are {shown(self.cameras)}; their names are needed")
@@ -245,14 +248,23 @@ class Export(ExportOptions):
         if self.size is not None:
             checked_size("size", self.size)
         if names:
-            from robot_layouts.data.export.drawing import require_pictures
+            from robot_layouts.data.export.drawing import expect_packages
 
             lerobot = self.format == "lerobot"
-            require_pictures(
-                video=lerobot and not self.images,
-                images=lerobot and (self.images or self.depth),
-                driver=here,
-                without="video" if self.cameras is None else "cameras",
+            expect_packages(
+                video=lerobot and not self.images, images=lerobot and (self.images or self.depth)
+            )
+
+    def expect_driver(self, simulator: str) -> None:
+        """Refuse pictures if a simulator draws none on this machine.
+
+        Raises:
+            SimulationError: If pictures are wanted and it has no usable driver.
+        """
+        if self.camera_names and (problem := drawing_problem(simulator)):
+            without = "video" if self.cameras is None else "cameras"
+            raise SimulationError(
+                f"no pictures can be drawn here: {problem}; export without {without}"
             )
 
 
@@ -298,13 +310,15 @@ def export(
         RecordingError: If the dataset cannot be written, or its folder holds something already.
         MissingPackageError: If a package that the format needs is not installed.
         TaskError: If the options do not go together.
-        SimulationError: If there is no Vulkan driver to draw pictures with.
+        SimulationError: If there is no driver to draw pictures with.
         WorkerError: If workers cannot be started, or die again and again.
         AssetError: If robot files cannot be found.
     """
     out, progress = Path(wanted.out), _rising(progress)
-    wanted.check(here=executor is None or isinstance(executor, ProcessExecutor))
+    wanted.check()
     with Recording(wanted.recording) as file:
+        if executor is None or isinstance(executor, ProcessExecutor):  # others say so themselves
+            wanted.expect_driver(file.simulator)
         if not len(file):
             raise TrajectoryError(f"{file.path} holds no episodes; there is nothing to export")
         work = _Work(wanted, file, here=executor is None)

@@ -19,32 +19,27 @@ from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Trajectory
 from robot_layouts.data.video import INSTALL
 from robot_layouts.simulation import Simulation
-from robot_layouts.simulation.rendering import Cameras, Observers, vulkan_problem
+from robot_layouts.simulation.rendering import Cameras, Observers
 from robots import MissingPackageError, SimulationError
 from tasks import TaskEnv
 from tasks.engine.columns import OVERVIEW
 from tasks.episode import States, moments, open_loop
 
 
-def require_pictures(*, video: bool, images: bool, driver: bool, without: str) -> None:
-    """Refuse to go on where no pictures can be made.
+def expect_packages(*, video: bool, images: bool) -> None:
+    """Refuse to go on where a package that writes pictures is not installed.
 
     Args:
         video: Whether videos are written.
         images: Whether png images are.
-        driver: Whether this process draws them.
-        without: What to leave out then, in words.
 
     Raises:
-        MissingPackageError: If a package that writes them is not installed.
-        SimulationError: If there is no usable Vulkan driver.
+        MissingPackageError: If one is not.
     """
     if video and find_spec("imageio_ffmpeg") is None:
         raise MissingPackageError(f"videos need imageio and ffmpeg: {INSTALL}")
     if images and find_spec("PIL") is None:
         raise MissingPackageError(f"png images need pillow: {INSTALL}")
-    if driver and (problem := vulkan_problem()):
-        raise SimulationError(f"no pictures can be drawn here: {problem}; export without {without}")
 
 
 class Drawing:

@@ -37,6 +37,7 @@ from tasks import MultiRobotTask, Scenario, TaskEnv
 from tasks.arrays import row_of, stacked
 from tasks.engine.actions import ActionReader
 from tasks.episode import REBUILT, PlayedEpisode, Policy, Score, States, StepResult, open_loop
+from tasks.language.stages import STAGE_SCORE
 
 Row = NDArray[np.float32]
 
@@ -108,7 +109,8 @@ class EpisodePlayer:
         success = bool(self.moments) and self.moments[-1].success
         total = fsum(moment.reward for moment in self.moments)
         reason = "" if success else self.reason
-        return Score(success, total, len(self.moments), reason, waits_of(self.policy))
+        stage = self.moments[-1].stage_score if self.moments else None
+        return Score(success, total, len(self.moments), reason, waits_of(self.policy), stage)
 
     def episode(
         self, states: States, observations: Any, drawn: dict[str, Any] | None
@@ -277,9 +279,12 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
         seconds = (perf_counter() - began) / len(running)
         columns = (rewards, info["success"], terminated, truncated)
         rows = list(zip(*(column.tolist() for column in columns), strict=True))
+        stages = info[STAGE_SCORE].tolist() if STAGE_SCORE in info else [None] * env.num_envs
         for i in running:
             reward, success, ended, late = rows[i]
-            moment = StepResult(None, reward, bool(success), ended, late, seconds)
+            moment = StepResult(
+                None, reward, bool(success), ended, late, seconds, stage_score=stages[i]
+            )
             players[i].choices.append(choices[i])
             players[i].moments.append(moment)
         yield observation

@@ -241,6 +241,7 @@ def _episode(seed: int, score: TracedScore) -> EpisodeReceipt:
         score.trace.trace,
         score.reason,
         {name: asdict(trace) for name, trace in score.pictures.items()},
+        score.stage_score,
     )
 
 

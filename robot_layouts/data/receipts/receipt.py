@@ -29,6 +29,7 @@ from robot_layouts.core.schema import (
     check,
     exactly,
     whole,
+    within,
 )
 from robot_layouts.core.writing import write_whole
 from robot_layouts.data.playing.picture_digests import BYTES, PictureTrace
@@ -79,6 +80,7 @@ class _ReceiptEpisode(TypedDict):
     states: Digest
     trace: AnyText
     reason: NotRequired[AnyText]
+    stage_score: NotRequired[Annotated[float, within(0, 1)] | None]
     pictures: NotRequired[dict[Name, _PictureTrace]]
 
 
@@ -112,6 +114,8 @@ class EpisodeReceipt:
         pictures: Of the pictures that were observed, by camera and texture, such as
             ``base_camera/rgb``: ``pictures``, a SHA-256 in hex over the SHA-256 of each, and
             ``trace``, the first two bytes of each, in base64.
+        stage_score: That of the last stage it passed; None of a task without stages, or if it took
+            no step.
     """
 
     seed: int
@@ -124,6 +128,7 @@ class EpisodeReceipt:
     pictures: Mapping[str, Mapping[str, str]] = field(
         default_factory=dict[str, Mapping[str, str]], hash=False
     )
+    stage_score: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse values that no episode has.
@@ -279,8 +284,8 @@ class Receipt:
 
 
 def _brief(episode: EpisodeReceipt) -> dict[str, Any]:
-    """Return an episode as plain data, without a reason or pictures if there are none."""
-    return {name: value for name, value in asdict(episode).items() if value not in ("", {})}
+    """Return an episode as plain data, without a reason, pictures or stages if there are none."""
+    return {name: value for name, value in asdict(episode).items() if value not in ("", {}, None)}
 
 
 def _episode(about: Mapping[str, Any]) -> EpisodeReceipt:

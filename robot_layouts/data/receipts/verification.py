@@ -6,10 +6,12 @@ import os
 import re
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from os import PathLike
 from pathlib import Path
+from random import SystemRandom
 from shlex import quote
 from typing import Any
 
@@ -69,6 +71,7 @@ class EpisodeDifference:
         if self.step:
             where = f"states differ from step {self.step} on"
         fields = {"steps": "steps", "success": "success", "return": "total", "reason": "reason"}
+        fields["stage score"] = "stage_score"
         pairs = {n: (getattr(self.recorded, f), getattr(self.here, f)) for n, f in fields.items()}
         others = [
             f"{name} {_or_none(before)} in the receipt, {_or_none(now)} here"
@@ -306,6 +309,7 @@ def verify(
     task: str | None = None,
     robots: Mapping[str, RobotLike] | None = None,
     num_envs: int = 1,
+    episodes: int | None = None,
 ) -> Verification:
     """Play the episodes of a receipt again, and compare everything.
 
@@ -325,6 +329,8 @@ def verify(
         robots: Which robots these were, by place, where the receipt cannot say it.
         num_envs: How many episodes each process plays at once. Those of a batched policy are
             played as many at once as when the receipt was written.
+        episodes: Play so many of the receipt's alone, drawn at random; a few more where a batched
+            policy played several at once. None: all.
 
     Raises:
         ReceiptError: If it is no receipt or cannot be read, or its task or policy is not available
@@ -336,12 +342,16 @@ def verify(
     recorded = receipt if isinstance(receipt, Receipt) else Receipt.read(receipt)
     with _naming_variables(recorded):
         checked_whole("num_envs", num_envs, 1, None, ReceiptError)
+        if episodes is not None:
+            checked_whole("episodes", episodes, 1, None, ReceiptError)
         cls = _task(recorded, task)
         if policy is None:
             _expect_policy(recorded)
         cast, name = cast_of(EXPERT if policy is None else policy, cls)
         guessed = recorded.environment.get("guessed", {})
         making = make_again(recorded.making, guessed, cls, robots or {})
+        if episodes is not None:
+            recorded = _some_of(recorded, episodes)
         seeds = [episode.seed for episode in recorded.episodes]
         at_once = recorded.making.get("num_envs", min(num_envs, len(seeds)))
         scenario = make_scenario(cls, at_once, **making)
@@ -363,6 +373,15 @@ def verify(
         scores = scores_of(choose_executor(workers, executor), job, look)
         here = receipt_of(described, job, {seed: scores[seed] for seed in seeds})
         return Verification(recorded, here, images)
+
+
+def _some_of(receipt: Receipt, episodes: int) -> Receipt:
+    """Return a receipt of some of its episodes; what was played at once stays together."""
+    at_once = receipt.making.get("num_envs", 1)
+    groups = [*grouped([episode.seed for episode in receipt.episodes], at_once).values()]
+    drawn = SystemRandom().sample(groups, min(len(groups), -(-episodes // at_once)))
+    chosen = tuple(one for one in receipt.episodes if one.seed in {*chain(*drawn)})
+    return replace(receipt, episodes=chosen, claimed="" if receipt.untouched else receipt.claimed)
 
 
 def _watched(receipt: Receipt) -> WatchedPictures | None:

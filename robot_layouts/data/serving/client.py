@@ -15,6 +15,7 @@ from robots import RobotLayoutsError
 
 SECONDS = 60.0  # for an answer: the first one takes as long as making the world
 MOST_BYTES = 2**28  # of an observation
+TOO_BIG = 1009  # of a websocket's codes
 
 
 class RemoteTaskError(RobotLayoutsError, RuntimeError):
@@ -104,7 +105,7 @@ class RemoteEnv(gymnasium.Env[Any, Any]):
         try:
             self._socket.send(pack(message))
         except self._errors.ConnectionClosed as error:
-            raise self._error(f"closed the connection: {error}") from None
+            raise self._closed(error) from None
         answer = self._receive()
         if ERROR in answer:
             raise RemoteTaskError(answer[ERROR])
@@ -117,7 +118,14 @@ class RemoteEnv(gymnasium.Env[Any, Any]):
             self.close()  # its answer would come as that to another question
             raise self._error(f"sent no answer within {self._seconds:g} s") from None
         except self._errors.ConnectionClosed as error:
-            raise self._error(f"closed the connection: {error}") from None
+            raise self._closed(error) from None
+
+    def _closed(self, error: Any) -> RemoteTaskError:
+        if error.rcvd_then_sent and error.rcvd.code == TOO_BIG:
+            return self._error(f"reads no message as long as that: {error.rcvd.reason}")
+        if error.sent is not None and error.sent.code == TOO_BIG:
+            return self._error(f"sent a message of more than {MOST_BYTES / 1e6:.0f} MB")
+        return self._error(f"closed the connection: {error}")
 
     def _error(self, what: str) -> RemoteTaskError:
         return RemoteTaskError(f"the environment at {self._name}: {what}")

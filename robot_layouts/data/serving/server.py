@@ -26,7 +26,7 @@ from robots import TaskError
 from tasks import make
 from tasks.cell_options import CellOptions
 
-MOST_BYTES = 2**20  # of a client's message: an action takes some hundred
+MOST_BYTES = 2**24  # of a client's message, else the connection ends
 CLIENTS = 8
 _TOKEN_BYTES = 32
 _REFUSED = "The token is missing or another: connect to the address that the command printed.\n"

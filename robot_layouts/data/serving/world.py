@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Dict, Space
+from numpy.typing import NDArray
 
 from robot_layouts.core.processes.transport import as_ours
 from robot_layouts.core.quoting import shown
@@ -21,6 +22,7 @@ from tasks.interfaces.gymnasium import info_row, row
 
 CALL, ERROR = "call", "error"
 _RESET, _STEP = "reset", "step"
+MOST_READ = 2**20  # bytes of a client's message: an action takes some hundred
 
 
 class ClientWorld:
@@ -46,6 +48,11 @@ class ClientWorld:
     def _answer(self, data: bytes | str) -> dict[str, Any]:
         if isinstance(data, str):
             raise TaskError(f"a text was sent, {shown(data)}; a message is a mapping in msgpack")
+        if len(data) > MOST_READ:
+            raise TaskError(
+                f"a message of {len(data):,} bytes was sent; {MOST_READ:,} are most, and an action"
+                " takes some hundred"
+            )
         message = unpack(data)
         if not isinstance(message, Mapping):
             raise TaskError(f"{shown(message)} was sent; a message is a mapping")
@@ -104,16 +111,24 @@ def about(env: TaskEnv) -> dict[str, Any]:
 
 
 def written_space(space: Space[Any]) -> dict[str, Any]:
-    """Return a space as what can be sent: its bounds, or those of its parts by name."""
+    """Return a space as what can be sent: its bounds, or those of its parts by name.
+
+    Bounds that are the same for all numbers are single ones, so that pictures take no more.
+    """
     if isinstance(space, Dict):
         return {"parts": {name: written_space(part) for name, part in space.spaces.items()}}
     assert isinstance(space, Box)  # all that tasks observe and take
-    return {"low": space.low, "high": space.high}
+    return {"low": _bound(space.low), "high": _bound(space.high), "shape": list(space.shape)}
+
+
+def _bound(numbers: NDArray[Any]) -> NDArray[Any]:
+    same = numbers.size > 0 and (numbers == numbers.flat[0]).all()
+    return numbers.flat[:1].reshape(()) if same else numbers
 
 
 def read_space(written: Mapping[str, Any]) -> Space[Any]:
     """Return the space that `written_space` wrote."""
     if "parts" in written:
         return Dict({name: read_space(part) for name, part in written["parts"].items()})
-    low, high = written["low"], written["high"]
+    low, high = (np.broadcast_to(written[name], written["shape"]) for name in ("low", "high"))
     return Box(low, high, dtype=low.dtype.type)

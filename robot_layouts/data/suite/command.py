@@ -7,13 +7,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from robot_layouts.core.cli import Word
+from robot_layouts.core.cli import Count, Folder, Natural, Word
 from robot_layouts.core.commands import printable
 from robot_layouts.data.playing.command_options import GOES_ON, Players, stoppable, tell
 
 if TYPE_CHECKING:
     from robot_layouts.core.progress import Progress
     from robot_layouts.data.playing.scheduler import Event
+    from robot_layouts.data.suite.checked import CheckedRun
+    from robot_layouts.data.suite.clips import WorstSeed
     from robot_layouts.data.suite.suite import Case
 
 SuiteName = Annotated[str, Word("SUITE")]
@@ -87,31 +89,90 @@ def run(
 def report(
     folders: Sequence[RunFolder],
     *,
-    out: Annotated[Path, Word("PAGE")] | None = None,
+    out: Folder | None = None,
+    episodes: Count = 3,
+    clips: Natural = 0,
+    policy: Sequence[Annotated[str, Word("MODULE:NAME|ws://HOST:PORT")]] = (),
     task: Tasks = (),
-) -> None:
-    """Write what runs of one suite amount to: an HTML page, and Markdown beside it.
+    players: Players,
+) -> int:
+    """Play some episodes of runs again, and write a page of those that are what they say.
+
+    The folder has the page, index.html, the same tables as report.md, and all receipts that it
+    shows. Results of policies that are not named stand apart, as not verified here, and nothing of
+    them is imported. Exit code: 0 if the page was written; 1 if not, or if a result could not be
+    listed; 2 for bad usage, 130 if interrupted.
 
     Args:
-        folders: The folder of a run; several are compared.
-        out: The HTML file (report.html in the first folder).
+        folders: The folder of a run; those of one suite are compared.
+        out: Where to write it (report in the first folder).
+        episodes: Play N of each receipt, drawn at random.
+        clips: Film the N seeds of each suite at which most runs failed; needs a graphics driver
+            and the extra video.
+        policy: Policies that may be imported or asked, as receipts name them.
         task: Tasks of the suite that no installed package lists, whose modules are imported.
+        players: Who plays.
 
     Raises:
         RobotLayoutsError: If a run cannot be read, or the page not be written.
     """
-    from robot_layouts.core.writing import write_whole
-    from robot_layouts.data.suite.report import read_runs, render_markdown, render_page
+    from robot_layouts.core.progress import Progress
+    from robot_layouts.data.suite import page
+    from robot_layouts.data.suite.checked import check_run
 
     _import_tasks(task)
-    runs = read_runs(folders)
-    page = out or folders[0] / "report.html"
-    write_whole(page, render_page(runs))
-    write_whole(page.with_suffix(".md"), render_markdown(runs))
-    print(printable(f"{page}, {page.with_suffix('.md')}"))
+    out = out or folders[0] / "report"
+    page.expect_place(out)
+    executor, line = players.executor(), Progress(len(folders), "runs")
+
+    def show(case: Case, event: Event) -> None:
+        tell(line, event)
+        line.advance(0, f"{case.name}, seed {event.seed}")
+
+    with stoppable(), line:
+        found = []
+        for folder in folders:
+            found.append(check_run(folder, episodes, policy, executor=executor, on_event=show))
+            line.advance(1, f"{folder} is checked")
+        checked = page.named_apart(found)
+        films, remark = _films(page.by_suite(checked), clips, line)
+        page.write_page(out, checked, films, remark)
+    wrong = [f"{one.run.folder.name}, {w}" for one in checked for w in one.wrong]
+    for what in wrong:
+        print(printable(f"not listed: {what}"))
+    print(printable(str(out / page.PAGE)))
+    return 1 if wrong else 0
 
 
-def verify(folder: RunFolder, *, policy: Policies = (), task: Tasks = (), players: Players) -> int:
+def _films(
+    suites: Sequence[Sequence[CheckedRun]], count: int, line: Progress
+) -> tuple[list[WorstSeed], str]:
+    """Return films of the worst seeds of each suite, or why there are none."""
+    from robot_layouts.data.suite.clips import film_worst
+    from robot_layouts.data.video import video_problem
+
+    if not count:
+        return [], ""
+    shown = [[one.run for one in several if one.run.receipts] for several in suites]
+    receipts = [receipt for runs in shown for run in runs for receipt in run.receipts.values()]
+    for simulator in {receipt.making["simulator"] for receipt in receipts}:
+        if problem := video_problem(simulator):
+            return [], f"There are no clips: {problem}."
+    return [
+        film
+        for runs in filter(None, shown)
+        for film in film_worst(runs, count, lambda what: line.advance(0, what))
+    ], ""
+
+
+def verify(
+    folder: RunFolder,
+    *,
+    episodes: Count | None = None,
+    policy: Policies = (),
+    task: Tasks = (),
+    players: Players,
+) -> int:
     """Play every episode of a run again, and compare every state.
 
     Exit code: 0 if every episode is equal to the last bit, 1 if not, 2 for bad usage, 130 if
@@ -119,6 +180,7 @@ def verify(folder: RunFolder, *, policy: Policies = (), task: Tasks = (), player
 
     Args:
         folder: The folder of a run.
+        episodes: Play N of each receipt alone, drawn at random (all).
         policy: A policy that can be imported, or 'expert': of one task, or of all that are not
             named (the experts).
         task: Tasks of the suite that no installed package lists, whose modules are imported.
@@ -132,11 +194,13 @@ def verify(folder: RunFolder, *, policy: Policies = (), task: Tasks = (), player
 
     _import_tasks(task)
     played = read_run(folder)
-    episodes = sum(len(receipt.episodes) for receipt in played.receipts.values())
-    with stoppable(), Progress(episodes, "episodes") as line:
+    counts = [len(receipt.episodes) for receipt in played.receipts.values()]
+    total = sum(min(count, episodes or count) for count in counts)
+    with stoppable(), Progress(total, "episodes") as line:
         found = verify_run(
             played,
             _policies(policy),
+            episodes=episodes,
             executor=players.executor(),
             on_event=_shower(line),
         )

@@ -1,16 +1,16 @@
-"""The report of a suite's runs: tables as texts, on one HTML page and the same as Markdown."""
+"""The report of runs of suites: tables as texts, on one HTML page and the same as Markdown."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from string import ascii_uppercase
 
-from robot_layouts.core.pages import Tile, fragment, page, plural
+from robot_layouts.core.pages import plural
 from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.receipts.receipt import Receipt
 from robot_layouts.data.suite.results import (
@@ -27,7 +27,7 @@ from robots import TaskError
 
 ALL = "all"  # the row of all cases together
 NONE = "–"
-LETTERS = "ABCDEFGH"  # of runs that stand side by side
+LETTERS = ascii_uppercase  # of runs that stand side by side
 
 INTERVALS = (
     "Shares of episodes that ended in success, in percent, with 95 % confidence intervals (Wilson's"
@@ -46,11 +46,8 @@ _SHOWN, _REASONS = 10, 3  # seeds and reasons that a row names
 _NAMED = ("robot-layouts", "sapien", "torch", "numpy", "python")  # versions
 
 Rows = Sequence[tuple[str, ...]]
-STYLE = ("robot_layouts.data.suite", "suite.css")
 
 _MARKUP = re.compile(r"[\\`*_\[\]!|~]|(?<=:)/|(?<=www)\.", re.IGNORECASE)
-
-_WIDTH, _ROW = 160, 12  # of a chart of intervals
 
 
 @dataclass(frozen=True)
@@ -76,10 +73,7 @@ def successes(runs: Sequence[SuiteRun]) -> ReportTable:
     rows: list[tuple[str, ...]] = []
     for name, results in results_of(runs).items():
         counts = {f"{result.episodes:,}" for result in results if result is not None}
-        rates = [
-            NONE if result is None else f"{percent(result.rate)} ({_interval(result.interval)})"
-            for result in results
-        ]
+        rates = map(rate, results)
         rows.append((name, *rates, " / ".join(sorted(counts)) or NONE))
     return ReportTable(("case", *_columns(runs, "success"), "episodes"), rows)
 
@@ -159,6 +153,14 @@ def _interval(interval: Interval, sign: str = "") -> str:
     return f"{low} to {high}"
 
 
+def rate(result: Result | None) -> str:
+    """Return a success rate in percent with its interval, and the mean score of stages."""
+    if result is None:
+        return NONE
+    words = f"{percent(result.rate)} ({_interval(result.interval)})"
+    return words if result.stage_score is None else f"{words}, stages {result.stage_score:.2f}"
+
+
 def _length(result: Result | None) -> tuple[str, str, str]:
     if result is None:
         return NONE, NONE, NONE
@@ -201,10 +203,15 @@ def summary(run: SuiteRun) -> Iterator[str]:
     """Yield the success of a run, a line for each case."""
     suite = run.suite
     yield f"{suite.name} {suite.id} in {run.folder}"
-    table = successes([run])
-    width = max(len(row[0]) for row in table.rows)
-    for name, rate, episodes in table.rows:
-        words = "not played" if rate == NONE else f"{rate} % of {episodes}"
+    results = results_of([run])
+    width = max(map(len, results))
+    for name, (result,) in results.items():
+        words = "not played"
+        if result is not None:
+            words = (
+                f"{percent(result.rate)} ({_interval(result.interval)}) % of {result.episodes:,}"
+            )
+            words += "" if result.stage_score is None else f", stages {result.stage_score:.2f}"
         yield f"  {name:<{width}}  {words}"
 
 
@@ -227,34 +234,16 @@ def read_runs(folders: Sequence[Path]) -> list[SuiteRun]:
     return runs
 
 
-def render_page(runs: Sequence[SuiteRun]) -> str:
-    """Return the report as HTML; see `read_runs`."""
-    suite, results = runs[0].suite, results_of(runs)
-    total = zip(runs, results[ALL], strict=True)
-    return page(
-        "robot_layouts.data.suite/report.html.jinja",
-        STYLE,
-        kicker="robot-layouts, a suite",
-        title=f"{suite.name} {suite.id}",
-        note=_about(runs),
-        tiles=[
-            Tile("episodes", f"{suite.episodes:,}", f"{plural(len(suite.cases), 'case')}"),
-            *(_tile(number, *of) for number, of in enumerate(total)),
-        ],
-        parts=[_shown(part, results) for part in _parts(runs)],
-    )
-
-
 def render_markdown(runs: Sequence[SuiteRun]) -> str:
     """Return the report's tables as Markdown; see `read_runs`."""
     suite = runs[0].suite
-    lines = [f"# {suite.name} {suite.id}", "", f"{_about(runs)} SHA-256: `{suite.hash}`.", ""]
-    for title, words, shown, text in _parts(runs):
-        lines += [f"## {title}", "", *([words, ""] if words else []), *_markdown(shown, text), ""]
+    lines = [f"# {suite.name} {suite.id}", "", f"{about(runs)} SHA-256: `{suite.hash}`.", ""]
+    for title, words, shown, text in parts(runs):
+        lines += [f"## {title}", "", *([words, ""] if words else []), *markdown(shown, text), ""]
     return "\n".join(lines)
 
 
-def _parts(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str, ReportTable, int]]:
+def parts(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str, ReportTable, int]]:
     """Yield of each part its title, its words, a table, and how many columns of it are text."""
     yield "Success", INTERVALS, successes(runs), 1
     for title, found in comparisons(runs):
@@ -268,52 +257,15 @@ def _parts(runs: Sequence[SuiteRun]) -> Iterator[tuple[str, str, ReportTable, in
     yield "Receipts", words, receipts(runs), 1 + len(runs)
 
 
-def _shown(
-    part: tuple[str, str, ReportTable, int], results: Mapping[str, Sequence[Result | None]]
-) -> dict[str, Any]:
-    """Return a part as the page's template takes it; that of successes has a chart in each row."""
-    title, words, shown, text = part
-    names, rows = shown.names, shown.rows
-    if title == "Success":
-        names = (*names[:-1], "0 to 100 %", names[-1])
-        rows = [(*row[:-1], _chart(results[row[0]]), row[-1]) for row in rows]
-    return {"title": title, "words": words, "names": names, "rows": rows, "text": text}
-
-
-def _tile(number: int, run: SuiteRun, result: Result | None) -> Tile:
-    assert result is not None  # `read_runs` has seen to that
-    note = f"{result.successes:,} of {result.episodes:,}"
-    if run.missing:
-        note += f"; {plural(len(run.missing), 'case')} not played"
-    label = f"{LETTERS[number]}: success of {run.folder.resolve().name}"
-    return Tile(label, f"{percent(result.rate)} %", note)
-
-
-def _about(runs: Sequence[SuiteRun]) -> str:
+def about(runs: Sequence[SuiteRun]) -> str:
+    """Return how large the suite of runs is, in a sentence."""
     suite = runs[0].suite
     count = f"{plural(len(suite.cases), 'case')}, {suite.episodes:,} episodes"
     return f"A suite of {count}, in {plural(len(runs), 'run')}."
 
 
-def _chart(results: Sequence[Result | None]) -> str:
-    """Return an interval for each run, drawn from 0 to 100 %."""
-    whiskers = [
-        {
-            "place": place,
-            "words": f"{LETTERS[place]}: {result.successes:,} of {result.episodes:,}",
-            "y": _ROW * (place + 0.5),
-            "low": _WIDTH * result.interval[0],
-            "high": _WIDTH * result.interval[1],
-            "rate": _WIDTH * result.rate,
-        }
-        for place, result in enumerate(results)
-        if result is not None
-    ]
-    sizes = {"width": _WIDTH, "height": _ROW * len(results)}
-    return fragment("robot_layouts.data.suite/intervals.svg.jinja", whiskers=whiskers, **sizes)
-
-
-def _markdown(shown: ReportTable, text: int) -> Iterator[str]:
+def markdown(shown: ReportTable, text: int) -> Iterator[str]:
+    """Yield the lines of a table whose first columns, as many as ``text``, hold text."""
     yield _row(shown.names)
     yield _row([("---" if place < text else "--:") for place in range(len(shown.names))])
     yield from map(_row, shown.rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from math import sqrt
 from statistics import NormalDist, mean, median
@@ -30,6 +30,7 @@ class Result:
         length: Control steps, median.
         lengths: The fewest and the most.
         total: Return, mean.
+        stage_score: Mean score of the last stages that they passed; None of a task without stages.
     """
 
     successes: int
@@ -38,6 +39,7 @@ class Result:
     length: float
     lengths: tuple[int, int]
     total: float
+    stage_score: float | None = None
 
     @property
     def rate(self) -> float:
@@ -87,7 +89,15 @@ def result_of(episodes: Episodes) -> Result:
         median(steps),
         (min(steps), max(steps)),
         mean(one.total for one in episodes),
+        _stage_score(episodes),
     )
+
+
+def _stage_score(episodes: Episodes) -> float | None:
+    """Return the mean score of stages; an episode of no steps has passed none."""
+    if all(one.stage_score is None for one in episodes):
+        return None
+    return mean(one.stage_score or 0.0 for one in episodes)
 
 
 def overall(receipts: Sequence[Receipt]) -> Result | None:
@@ -97,7 +107,7 @@ def overall(receipts: Sequence[Receipt]) -> Result | None:
     it is rather too wide than too narrow.
     """
     episodes = list(chain.from_iterable(one.episodes for one in receipts))
-    return result_of(episodes) if episodes else None
+    return replace(result_of(episodes), stage_score=None) if episodes else None
 
 
 def compare(pairs: Sequence[tuple[Receipt, Receipt]]) -> list[Comparison]:

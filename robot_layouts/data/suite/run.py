@@ -101,10 +101,9 @@ def begin_run(folder: Path, suite: Suite) -> SuiteRun:
         return run
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise TaskError(f"{folder} holds something else; the run of a suite needs its own folder")
-    with writing_errors(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-    save_suite(suite, folder / SUITE)
-    return SuiteRun(folder, suite, {})
+    run = SuiteRun(folder, suite, {})
+    write_run(run)
+    return run
 
 
 def read_run(folder: Path) -> SuiteRun:
@@ -114,18 +113,52 @@ def read_run(folder: Path) -> SuiteRun:
         TaskError: If there is none.
         ReceiptError: If a receipt in it is damaged, or of something else.
     """
+    suite = read_suite(folder)
+    found = {case.name: read_receipt(folder, case) for case in played_cases(folder, suite)}
+    return SuiteRun(folder, suite, found)
+
+
+def read_suite(folder: Path) -> Suite:
+    """Return the suite of the run in a folder.
+
+    Raises:
+        TaskError: If there is none.
+    """
     if not (folder / SUITE).is_file():
         raise TaskError(
             f"{folder} holds no run of a suite; `robot-layouts suite run SUITE --out {folder}`"
             " makes one"
         )
-    suite = load_suite(folder / SUITE)
-    found = {
-        case.name: expect_of_case(Receipt.read(path), case, path)
-        for case in suite.cases
-        if (path := receipt_path(folder, case)).exists()
-    }
-    return SuiteRun(folder, suite, found)
+    return load_suite(folder / SUITE)
+
+
+def played_cases(folder: Path, suite: Suite) -> list[Case]:
+    """Return the cases of a suite that have a receipt in a folder, whatever it is."""
+    return [case for case in suite.cases if receipt_path(folder, case).exists()]
+
+
+def read_receipt(folder: Path, case: Case) -> Receipt:
+    """Return the receipt of a case.
+
+    Raises:
+        ReceiptError: If it is damaged, or of something else.
+    """
+    path = receipt_path(folder, case)
+    return expect_of_case(Receipt.read(path), case, path)
+
+
+def write_run(run: SuiteRun) -> None:
+    """Write the suite and the receipts of a run to its folder, which is made if need be.
+
+    Raises:
+        UnwritableFileError: If they cannot be written.
+    """
+    with writing_errors(run.folder):
+        run.folder.mkdir(parents=True, exist_ok=True)
+    save_suite(run.suite, run.folder / SUITE)
+    for case in run.suite.cases:
+        if case.name in run.receipts:
+            run.receipts[case.name].write(receipt_path(run.folder, case))
 
 
 def expect_untouched(run: SuiteRun) -> SuiteRun:
@@ -135,11 +168,20 @@ def expect_untouched(run: SuiteRun) -> SuiteRun:
         ReceiptError: If one is not.
     """
     for case in run.suite.cases:
-        receipt = run.receipts.get(case.name)
-        if receipt is not None and not receipt.untouched:
-            path = receipt_path(run.folder, case)
-            raise ReceiptError(f"{path} was changed after it was written: its hash is another")
+        if case.name in run.receipts:
+            untouched(run.receipts[case.name], receipt_path(run.folder, case))
     return run
+
+
+def untouched(receipt: Receipt, path: Path) -> Receipt:
+    """Return a receipt that is as it was written.
+
+    Raises:
+        ReceiptError: If it is not.
+    """
+    if not receipt.untouched:
+        raise ReceiptError(f"{path} was changed after it was written: its hash is another")
+    return receipt
 
 
 def expect_of_case(receipt: Receipt, case: Case, path: Path) -> Receipt:
@@ -258,6 +300,7 @@ def verify_run(
     run: SuiteRun | str | PathLike[str],
     policy: Policy | str | Mapping[str, Policy | str] | None = None,
     *,
+    episodes: int | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
     on_event: Callable[[Case, Event], None] = lambda case, event: None,
@@ -267,6 +310,7 @@ def verify_run(
     Args:
         run: The run, or its folder.
         policy: Who plays where no expert does, as `run_suite` takes it.
+        episodes: Play so many of each receipt alone; see `verify`.
         workers: See `robot_layouts.data.evaluate`.
         executor: See `robot_layouts.data.evaluate`.
         on_event: Called with each event of a case, to show progress.
@@ -296,6 +340,7 @@ def verify_run(
                     executor,
                     lambda event, case=case: on_event(case, event),
                     policy=policies[case.name],
+                    episodes=episodes,
                 )
     return found
 

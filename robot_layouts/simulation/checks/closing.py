@@ -10,6 +10,7 @@ import numpy as np
 from layouts import Layout
 from objects.shapes import Box
 from robot_layouts.kinematics.rotations import Floats, inverse, inverse_pose, pose_matrix, rotate
+from robot_layouts.simulation.backend import CLONING
 from robot_layouts.simulation.checks.overlaps import stand
 from robot_layouts.simulation.checks.trial import NAME, RobotAlone
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
@@ -47,13 +48,14 @@ class Closed(NamedTuple):
 class Closing:
     """A gripper of a robot alone, that closes on a cube which floats between its fingers."""
 
-    def __init__(self, layout: Layout, arm: str, side: float) -> None:
+    def __init__(self, layout: Layout, arm: str, side: float, simulator: str = CLONING) -> None:
         """Take the gripper.
 
         Args:
             layout: The robot alone, under the name `NAME`.
             arm: The robot, or the limb, by its name in the layout.
             side: Of the cube (m).
+            simulator: In which it does; see `robot_layouts.simulation.Simulation`.
 
         Raises:
             DescriptorError: If it has no fingers.
@@ -65,7 +67,7 @@ class Closing:
         self._joints = layout[NAME].robot.joints
         self._gripper = [self._joints.index(joint) for joint in self._motion.joints]
         cube = Box((side / 2, side / 2, side / 2))
-        self._alone = RobotAlone(layout, (CUBE, cube), physics=_WEIGHTLESS)
+        self._alone = RobotAlone(layout, (CUBE, cube), physics=_WEIGHTLESS, simulator=simulator)
 
     def has_room(self, open_: Floats, place: tuple[Floats, Floats]) -> bool:
         """Return whether the cube is not inside the open hand; see `close`."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from layouts import Layout, single
 from objects.shapes import Plane, Shape
-from robot_layouts.simulation.backend import Overlap, Part
+from robot_layouts.simulation.backend import CLONING, Overlap, Part
 from robot_layouts.simulation.checks.overlaps import empty, stand, starting_overlaps
 from robot_layouts.simulation.maths import Array, Floats
 from robot_layouts.simulation.physics import PhysicsSettings
@@ -254,7 +254,11 @@ class RobotAlone:
     """
 
     def __init__(
-        self, layout: Layout, *bodies: tuple[str, Shape], physics: PhysicsSettings | None = None
+        self,
+        layout: Layout,
+        *bodies: tuple[str, Shape],
+        physics: PhysicsSettings | None = None,
+        simulator: str = CLONING,
     ) -> None:
         """Stand the robot of a layout in a world, with other bodies, by name, that move freely."""
         self.layout = layout
@@ -268,7 +272,7 @@ class RobotAlone:
                 world.add(name, shape)
 
         self.build = build
-        self.simulation = Simulation(layout, self.build, 1, physics)
+        self.simulation = Simulation(layout, self.build, 1, physics, simulator=simulator)
         self._limits = self.simulation.index.robots[NAME].speeds
         stand(self.simulation)
 

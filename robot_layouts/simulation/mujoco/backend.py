@@ -139,6 +139,7 @@ class MujocoBackend:
             world.update()
             data = world.data
             poses[i, :, :3], poses[i, :, 3:] = data.xpos[1:], data.xquat[1:]
+            self._index.turned.turn(poses[i, :, 3:], data.qpos)
             qpos[i], qvel[i] = data.qpos[joints.qpos], data.qvel[joints.qvel]
         return Readout(poses.swapaxes(0, 1), qpos, qvel)
 

@@ -17,6 +17,7 @@ from layouts.export.cell import ExportedCell, RobotSource, Standing
 from layouts.export.mjcf import mjcf_of
 from objects.shapes import Plane
 from robot_layouts.simulation.backend import Built, BuiltRobot, Part
+from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.mujoco.bodies import PREFIX, BodyMaker
 from robot_layouts.simulation.mujoco.friction import set_friction
 from robot_layouts.simulation.mujoco.library import mujoco
@@ -175,6 +176,38 @@ class Joints:
         )
 
 
+class Turned:
+    """Which of the two quaternions of a turn is told: PhysX's, so that observations are the same.
+
+    Each joint turns what it carries by a quaternion whose w is not negative. Beyond half a turn
+    that is minus the one of its angle, and so are those of all that the joint carries.
+
+    Attributes:
+        hinges: Where the positions of hinges stand among MuJoCo's.
+        carried: How often each of them carries a body, (bodies, hinges).
+    """
+
+    def __init__(self, model: Any) -> None:
+        """Look up which frames each joint carries."""
+        hinges = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)
+        self.hinges = model.jnt_qposadr[hinges]
+        self.carried = np.zeros((model.nbody, len(hinges)), np.int32)
+        for body, parent in enumerate(model.body_parentid.tolist()):
+            self.carried[body] = self.carried[parent] + (model.jnt_bodyid[hinges] == body)
+
+    def turn(self, quaternions: Floats, qpos: Floats) -> None:
+        """Turn quaternions round, in place.
+
+        Args:
+            quaternions: Those of a world's frames, (F, 4).
+            qpos: All of MuJoCo's positions of that world.
+        """
+        beyond = np.cos(qpos[self.hinges] / 2) < 0
+        if beyond.any():
+            odd = self.carried[1:] @ beyond % 2 == 1
+            quaternions[odd] *= -1
+
+
 class Inventory:
     """Where everything stands in models that were built alike; a frame is a body but the world's.
 
@@ -184,6 +217,7 @@ class Inventory:
         robots: Joints of each robot, in the descriptor's order.
         joints: Those of all robots.
         jointed: Joints of each body that has some.
+        turned: Which quaternions are told of frames.
     """
 
     def __init__(self, model: Any, world: World, cell: ExportedCell) -> None:
@@ -208,6 +242,7 @@ class Inventory:
         self.joints = Joints(
             np.concatenate([own.qpos for own in every]), np.concatenate([own.qvel for own in every])
         )
+        self.turned = Turned(model)
         frames = {name: number - 1 for name, number in bodies.items()}
         named = {
             name: tuple(joint.name for joint in world.bodies[name].joints) for name in self.jointed

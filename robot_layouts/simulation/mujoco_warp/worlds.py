@@ -141,6 +141,9 @@ class DeviceWorlds:
         self._targets = torch.zeros((count, model.nu), device=device)
         places = world.index.joints
         self._joints = [torch.from_numpy(own).to(device) for own in (places.qpos, places.qvel)]
+        turned = world.index.turned
+        self._hinges = torch.from_numpy(turned.hinges.astype("int64")).to(device)
+        self._carried = torch.from_numpy(turned.carried.T.astype("float32")).to(device)
         self._roots = torch.from_numpy(model.body_rootid.astype("int64")).to(device)
         self._touched = torch.zeros(count, dtype=torch.bool, device=device)  # since its reset
         self._forces: dict[tuple[Pair, ...], ForceReader] = {}
@@ -214,7 +217,10 @@ class DeviceWorlds:
         """Return poses and joints of all worlds; they stay as they are when the worlds move on."""
         self._locate()
         places, turns = self._bodies
-        poses: Any = torch.cat((places[:, 1:], turns[:, 1:]), -1).transpose(0, 1).contiguous()
+        beyond = torch.cos(self._qpos[:, self._hinges] / 2) < 0  # see `Turned`
+        odd = torch.remainder(beyond.float() @ self._carried, 2.0)
+        turns = turns * (1.0 - 2.0 * odd)[..., None]
+        poses: Any = torch.cat((places, turns), -1)[:, 1:].transpose(0, 1).contiguous()
         qpos, qvel = self._joints
         joints: Any = self._qpos[:, qpos], self._qvel[:, qvel]
         return Readout(poses, *joints)
