@@ -5,6 +5,7 @@ from __future__ import annotations
 from benchmarks.bench.run import bench, tables
 from benchmarks.collisions import collisions
 from benchmarks.conversions import conversions
+from benchmarks.device import device
 from benchmarks.engines import engines
 from benchmarks.experts import experts
 from benchmarks.gallery.pages import gallery
@@ -42,6 +43,7 @@ PROGRAM = Program(
             packaged,
             objects,
             engines,
+            device,
             experts,
             skills,
             conversions,

@@ -14,7 +14,14 @@ from pathlib import Path
 from types import ModuleType
 
 ROOMS = ("robots", "objects", "layouts", "tasks", "robot_layouts")
-NEED_MORE = ("layouts.export.usd", "layouts.export.usd_prims")  # usd-core, at import
+# What needs usd-core at import, and what needs MuJoCo Warp.
+NEED_MORE = (
+    *("layouts.export.usd", "layouts.export.usd_prims"),
+    *(
+        f"robot_layouts.simulation.mujoco_warp.{name}"
+        for name in ("contacts", "library", "linkages", "simulation", "worlds")
+    ),
+)
 
 # What macOS lacks of Linux, and Windows of both: modules, and names of modules.
 LACKING = {

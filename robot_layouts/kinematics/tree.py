@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from robot_layouts.kinematics.rotations import Floats, cross, rotation_about
 
 FIXED = -1  # in ``drivers``: no coordinate moves the joint
+_STILL = np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +155,8 @@ class Tree:
             link: Index of the link that it carries.
             position: Joint positions, (…) (rad or m).
         """
-        motion = np.broadcast_to(np.eye(4), (*position.shape, 4, 4)).copy()
+        motion = np.empty((*position.shape, 4, 4))
+        motion[:] = _STILL
         if self.slides[link]:
             motion[..., :3, 3] = position[..., None] * self.axes[link]
         else:

@@ -190,6 +190,9 @@ SIMULATORS = {
 }
 """Where each simulator's backend is, by the name that ``simulator=`` takes."""
 
+ON_DEVICES = "mujoco_warp"
+"""The simulator of whole vectors on a device, which is no `Backend`: `tasks.interfaces.device`."""
+
 CLONING = "sapien3"
 """The simulator in which clones of ManiSkill's tasks have its bits; in others their physics is
 another."""

@@ -22,7 +22,7 @@ LARGEST = 1e9  # N, and of a quaternion's entries: float32 holds the square of n
 FEW = 32  # worlds up to which plain floats take less time than torch: half of it for so many
 
 
-class _Thresholds(NamedTuple):
+class Thresholds(NamedTuple):
     """What a finger's force is compared with.
 
     Attributes:
@@ -78,7 +78,7 @@ def _clearly_held(
         poses: Pose of each finger link, each (7,).
     """
     clear: bool | None = True
-    for limits, force, pose in zip(_thresholds(fingers), forces, poses, strict=True):
+    for limits, force, pose in zip(thresholds(fingers), forces, poses, strict=True):
         one = _clearly_presses(limits, force, pose)
         if one is False:
             return False
@@ -87,7 +87,7 @@ def _clearly_held(
 
 
 def _clearly_presses(
-    limits: _Thresholds, force: Sequence[float], pose: Sequence[float]
+    limits: Thresholds, force: Sequence[float], pose: Sequence[float]
 ) -> bool | None:
     """Tell whether one finger's force, (3,) (N), is strong and straight; None if that is near."""
     (a, b, c), (fx, fy, fz), (_, _, _, w, x, y, z) = limits.opening, force, pose
@@ -112,11 +112,11 @@ def _clearly_presses(
 
 
 @lru_cache(maxsize=256)
-def _thresholds(fingers: Fingers) -> list[_Thresholds]:
+def thresholds(fingers: Fingers) -> list[Thresholds]:
     """Return what the force on each of two fingers is compared with."""
     cosine = cos(radians(fingers.max_angle))
     return [
-        _Thresholds((x / length, y / length, z / length), fingers.min_force, cosine)
+        Thresholds((x / length, y / length, z / length), fingers.min_force, cosine)
         for (x, y, z), sign in zip(fingers.opening_axes, fingers.opening_signs, strict=True)
         for length in [sign * hypot(x, y, z)]
     ]

@@ -149,7 +149,7 @@ def counted(x: Array, count: int) -> Any:
 def columns(x: Array, numbers: tuple[tuple[int, ...], ...] | NDArray[np.intp]) -> Any:
     """Return columns of ``x``, (..., k), by their numbers, (i, j); shape (..., i, j)."""
     if isinstance(x, Tensor):
-        return x[..., torch.as_tensor(numbers, device=x.device)]
+        return x[..., _kept(numbers, x.device)]
     return x.take(numbers if isinstance(numbers, np.ndarray) else _places(numbers), -1)
 
 
@@ -228,10 +228,10 @@ def arccos(x: Array) -> Any:
 def arctan2(y: Array, x: Array) -> Any:
     """Return torch's arc tangents of ``y / x``, shape (N,) (rad).
 
-    One by one, because torch's arc tangents of a batch round differently from those of one number.
+    Those of NumPy's arrays one by one, as native computes them: torch's of a batch round otherwise.
     """
     if isinstance(y, Tensor):
-        return torch.stack([torch.atan2(a, b) for a, b in zip(y, _any(x), strict=True)])
+        return torch.atan2(y, _any(x))
     angles = y.copy()
     for a, b in zip(torch.from_numpy(angles).unbind(), torch.from_numpy(x).unbind(), strict=True):
         a.atan2_(b)
@@ -259,16 +259,17 @@ def like(x: Array, values: Any) -> Any:
 
     Args:
         x: The other array.
-        values: Nested tuples of numbers, whose arrays are kept and cannot be changed; or lists.
+        values: Nested tuples of numbers, whose arrays are kept and must not be changed; or lists.
     """
     if isinstance(x, Tensor):
-        return torch.tensor(values, dtype=torch.float32, device=x.device)
+        kept = _constant_on(x.device, _as_tuples(values))
+        return kept if isinstance(values, tuple) else kept.clone()
     return _constant(values) if isinstance(values, tuple) else np.array(values, np.float32)
 
 
 def constant(x: Array, values: Floats) -> Any:
     """Return a constant NumPy array as an array of the kind of ``x``, whose memory it may share."""
-    return torch.from_numpy(values).to(x.device) if isinstance(x, Tensor) else values
+    return _kept(values, x.device) if isinstance(x, Tensor) else values
 
 
 def full(x: Array, count: int, value: float) -> Any:
@@ -322,6 +323,27 @@ def _constant(values: Any) -> Floats:
     array = np.array(values, np.float32)
     array.flags.writeable = False
     return array
+
+
+# A device's copies of constants are kept: to copy one anew is to wait for the device.
+_copies: dict[Any, tuple[Any, Tensor]] = {}
+
+
+def _kept(values: Any, device: Any) -> Tensor:
+    """Return nested tuples of numbers, or a constant array of a module, on a device."""
+    key = (values if isinstance(values, tuple) else id(values)), device
+    if key not in _copies:  # which holds the array, so that its number stays its own
+        _copies[key] = values, torch.from_numpy(np.array(values)).to(device)
+    return _copies[key][1]
+
+
+@lru_cache(maxsize=4096)
+def _constant_on(device: torch.device, values: Any) -> Tensor:
+    return torch.tensor(values, dtype=torch.float32, device=device)
+
+
+def _as_tuples(values: Any) -> Any:
+    return tuple(map(_as_tuples, values)) if isinstance(values, (list, tuple)) else values
 
 
 def _any(x: object) -> Any:

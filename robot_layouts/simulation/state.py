@@ -33,19 +33,20 @@ from robots.descriptor import Vector3
 _NOTHING = np.empty(0, np.float32)
 _Arguments = ParamSpec("_Arguments")
 _Owner = TypeVar("_Owner")
+_State = TypeVar("_State", bound="State")
 _Value = TypeVar("_Value")
 
 
-def _remembered(
-    compute: Callable[Concatenate[State, _Arguments], _Value],
-) -> Callable[Concatenate[State, _Arguments], _Value]:
+def remembered(
+    compute: Callable[Concatenate[_State, _Arguments], _Value],
+) -> Callable[Concatenate[_State, _Arguments], _Value]:
     """Compute once per state and arguments: rewards ask for what success was judged by.
 
     Views of what was read cost less than a look-up and are not remembered.
     """
 
     @wraps(compute)
-    def look_up(self: State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
+    def look_up(self: _State, *args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Value:
         key = (compute, args, *kwargs.items()) if kwargs else (compute, args)
         found = self.memo.get(key)
         if found is None:
@@ -178,12 +179,12 @@ class State:
         """Orientation of a body, wxyz, shape (N, 4)."""
         return self.all_poses[self._index.bodies[body], :, 3:]
 
-    @_remembered
+    @remembered
     def rotation(self, body: str) -> Floats:
         """Rotation matrix of a body, shape (N, 3, 3); its columns are the body's axes."""
         return rotation_matrix(self.quaternion(body))
 
-    @_remembered
+    @remembered
     def last_euler_angle(self, body: str) -> Floats:
         """Angle about z of a body turned about its own x, then y, then z, shape (N,) (rad)."""
         return last_euler_angle(self.rotation(body))
@@ -216,7 +217,7 @@ class State:
         """Linear and angular velocity of each robot's root, (robots, N, 6) (m/s, rad/s)."""
         return self._moment.root_velocities()
 
-    @_remembered
+    @remembered
     def body_joints(self, body: str) -> Floats:
         """Positions, then velocities of a body's joints, (N, 2 · joints) (m, rad, and per s)."""
         self._index.body_joints.expect(body)
@@ -295,7 +296,7 @@ class State:
         first, second = (self._index.links[robot][link] for link in fingers.links)
         return self._distance(second, first)
 
-    @_remembered
+    @remembered
     def gripper_opening(self, robot: str) -> Floats:
         """How far a robot's gripper is open, shape (N,): 0 closed, 1 wide open, 1 without one."""
         gripper = self._index.grippers[robot]
@@ -304,12 +305,12 @@ class State:
         joints, widest = gripper
         return np.add.reduce(self.joint_positions[:, joints], 1) / widest
 
-    @_remembered
+    @remembered
     def arm_speed(self, robot: str) -> Floats:
         """Euclidean norm of the arm's joint velocities, shape (N,) (rad/s)."""
         return norm(self.arm_qvel(robot))
 
-    @_remembered
+    @remembered
     def is_static(self, robot: str, threshold: float = 0.2) -> Flags:
         """Whether no arm joint is faster than ``threshold`` (rad/s), shape (N,) bool."""
         speeds = np.abs(self.joint_velocities[:, self._index.arm_joints[robot]])
@@ -329,7 +330,7 @@ class State:
         forces = self._all_forces(number)
         return np.zeros((self.num_envs, 3), np.float32) if forces is None else forces[number]
 
-    @_remembered
+    @remembered
     def is_grasping(self, robot: str, body: str, max_angle: float | None = None) -> Flags:
         """Whether a robot's two fingers hold a body, shape (N,) bool; see `robots.Fingers`.
 
@@ -353,7 +354,7 @@ class State:
         if forces is None:
             return np.zeros(self.num_envs, bool)
         if max_angle is not None:
-            fingers = _within(fingers, max_angle)
+            fingers = within(fingers, max_angle)
         poses = [self.link_pose(robot, link) for link in fingers.links]
         return grasped(fingers, forces.take(pairs, 0), poses)
 
@@ -473,7 +474,8 @@ def _both_velocities(bodies: tuple[str, ...]) -> tuple[Velocity, ...]:
 
 
 @cache  # making one checks it, which is too slow for every step
-def _within(fingers: Fingers, max_angle: float) -> Fingers:
+def within(fingers: Fingers, max_angle: float) -> Fingers:
+    """Return fingers whose force may be so far from straight (degrees)."""
     return replace(fingers, max_angle=max_angle)
 
 

@@ -16,7 +16,7 @@ class CellServe(CellTask):
     """Hand the can on over the hatch, stand it on the place, and ring.
 
     The can stands before the waiter, x in [-0.15, -0.05], y in [-0.2, -0.12]; the bell before the
-    ringer, x in [-0.3, -0.2], y in [0.2, 0.3] (m). Of the two marks, the waiter reaches only the hatch.
+    ringer, x in [-0.3, -0.2], y in [0.2, 0.3] (m). The waiter reaches the hatch, but not the place.
 
     Success: the can rests on its place, let go, while the bell is pressed by 5 mm.
     """
@@ -29,8 +29,8 @@ class CellServe(CellTask):
     )
     layout = Layout(
         {
-            "waiter": Placement("fetch", (0.0, -0.68, 0.005), rpy=(0.0, 0.0, pi / 2)),
             "server": Placement("franka_panda", (0.6, 0.35, 0.0), rpy=(0.0, 0.0, -5 * pi / 6)),
+            "waiter": Placement("fetch", (0.0, -0.68, 0.005), rpy=(0.0, 0.0, pi / 2)),
             "ringer": Placement("panda_stick", (-0.65, 0.375, 0.0), rpy=(0.0, 0.0, -pi / 6)),
         }
     )

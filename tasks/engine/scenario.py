@@ -13,7 +13,7 @@ from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_choice, checked_flag, checked_whole, shown
 from robot_layouts.core.operating_system import memory
 from robot_layouts.simulation import SAPIEN_DEFAULTS, Camera, PhysicsSettings
-from robot_layouts.simulation.backend import SIMULATORS
+from robot_layouts.simulation.backend import ON_DEVICES, SIMULATORS
 from robot_layouts.simulation.physics import substeps
 from robot_layouts.simulation.world import Visuals
 from robots import TaskError, UnknownNameError
@@ -152,6 +152,11 @@ class Scenario:
             raise TaskError(
                 f"randomization is {shown(self.randomization)}; a tasks.Randomization or None is"
                 " needed"
+            )
+        if self.simulator == ON_DEVICES:
+            raise TaskError(
+                f"simulator {ON_DEVICES!r} steps whole vectors on a device: gymnasium.make_vec("
+                f"'RobotLayouts/…', num_envs=…, simulator={ON_DEVICES!r}, device='cuda:0')"
             )
         for name, choices in (
             ("simulator", tuple(SIMULATORS)),

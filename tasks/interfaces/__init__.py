@@ -14,9 +14,11 @@ from tasks.interfaces.spec import NAMESPACE, TaskSpec
 from tasks.registry import list_own
 
 if TYPE_CHECKING:
+    from tasks.interfaces.device import DeviceTask
     from tasks.interfaces.lerobot import LeRobotTask
     from tasks.interfaces.parallel import ParallelTask
     from tasks.interfaces.sb3 import SB3Task
+    from tasks.interfaces.vector import VectorTask
 
 _GYMNASIUM_NAME = re.compile(r"[\w.-]+-v\d+")
 
@@ -44,9 +46,40 @@ def register(task_ids: Iterable[str]) -> None:
             registry[name] = TaskSpec(
                 name,
                 entry_point="tasks.interfaces.gymnasium:GymnasiumTask",
-                vector_entry_point="tasks.interfaces.vector:VectorTask",
+                vector_entry_point="tasks.interfaces:vector_env",
                 kwargs={"task_id": task_id},
             )
+
+
+def vector_env(
+    task_id: str, num_envs: int = 1, simulator: str | None = None, **fields: Any
+) -> VectorTask | DeviceTask:
+    """Make what ``gymnasium.make_vec`` gives of a task.
+
+    Args:
+        task_id: The task's id or another of its names.
+        num_envs: Number of environments.
+        simulator: What simulates them; with ``"mujoco_warp"`` they are on a device, and what
+            comes and goes are its tensors. None takes the task's.
+        fields: Other arguments of `tasks.interfaces.vector.VectorTask`, or of
+            `tasks.interfaces.device.DeviceTask`.
+
+    Raises:
+        MissingPackageError: If the simulator's package is not installed.
+        UnknownNameError: If the task, a place, a robot or a field is unknown.
+        TaskError: If the task cannot be made like that.
+        SimulationError: If there is no such device, or it has too little memory.
+        AssetError: If robot files cannot be found.
+        VectorWorkerError: If a worker ends before it is ready.
+    """
+    if simulator == "mujoco_warp":
+        from tasks.interfaces.device import DeviceTask
+
+        return DeviceTask(task_id, num_envs, **fields)
+    from tasks.interfaces.vector import VectorTask
+
+    given = {} if simulator is None else {"simulator": simulator}
+    return VectorTask(task_id, num_envs, **given, **fields)
 
 
 def parallel_env(

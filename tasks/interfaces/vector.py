@@ -125,7 +125,7 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
             VectorWorkerError: If a worker ends before it is ready.
         """
         self.busy = Lock()
-        mode = _checked_mode(autoreset_mode)
+        mode = checked_mode(autoreset_mode)
         cls = get_task_class(task_id)
         scenario = make_scenario(cls, num_envs, render_mode=render_mode, **fields)
         scenario.check(cls.reward_modes)
@@ -410,7 +410,12 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
         return mask, bool(options.get(RECONFIGURE, False))
 
 
-def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Return a mode by itself, its value or its name.
+
+    Raises:
+        TaskError: If there is no such mode.
+    """
     for choice in AutoresetMode:
         if mode in (choice, choice.value, choice.name):
             return choice

@@ -15,14 +15,23 @@ from robots import JointGroup
 
 
 class LedGroup:
-    """The drives of a joint group with leaders; see `robot_layouts.simulation.linkage`."""
+    """The drives of a joint group with leaders; see `robot_layouts.simulation.linkage`.
+
+    Attributes:
+        group: The group.
+        places: Where its joints stand among all that are driven.
+        multipliers: What each joint multiplies the group's value by.
+        offsets: What it adds to that then.
+        leads: Which of them are leaders.
+    """
 
     def __init__(self, group: JointGroup, first: int) -> None:
         """Take a group, and where its first joint stands among all that are driven."""
+        self.group = group
         self.places = slice(first, first + len(group.joints))
         self._leaders = Leaders(group)
-        self._multipliers, self._offsets = np.array(group.followers, float).T
-        self._leads = np.array([joint in group.leaders for joint in group.joints])
+        self.multipliers, self.offsets = np.array(group.followers, float).T
+        self.leads = np.array([joint in group.leaders for joint in group.joints])
 
     def targets(self, wanted: float, qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
         """Return targets of position and of velocity of the group's joints, each (joints,).
@@ -32,10 +41,10 @@ class LedGroup:
             qpos: Positions of its joints.
             qvel: Their velocities.
         """
-        goal, leads = (wanted - self._offsets[0]) / self._multipliers[0], self._leaders.places
+        goal, leads = (wanted - self.offsets[0]) / self.multipliers[0], self._leaders.places
         ahead, value, speed = self._leaders.moved(goal, qpos[leads], qvel[leads])
-        positions = self._multipliers * np.where(self._leads, ahead, value) + self._offsets
-        return positions, np.where(self._leads, 0.0, self._multipliers * speed)
+        positions = self.multipliers * np.where(self.leads, ahead, value) + self.offsets
+        return positions, np.where(self.leads, 0.0, self.multipliers * speed)
 
 
 class JointDrives:
@@ -55,7 +64,7 @@ class JointDrives:
         self.positions = np.tile(np.array(start), (len(worlds), 1))
         self.velocities = np.zeros_like(self.positions)
         self._worlds, self._joints = worlds, index.joints
-        self._linkages = list(_linkages(layout))
+        self._linkages = linkages(layout)
         if self._linkages:
             for i, world in enumerate(worlds):
                 world.before_each = lambda i=i: self.pull(i)
@@ -74,7 +83,8 @@ class JointDrives:
         data.ctrl[:] = -springs * positions - dampers * velocities
 
 
-def _linkages(layout: Layout) -> list[LedGroup]:
+def linkages(layout: Layout) -> list[LedGroup]:
+    """Return the joint groups of a layout that have leaders."""
     found: list[LedGroup] = []
     first = 0
     for placement in layout.values():

@@ -181,15 +181,19 @@ class Turned:
 
     Each joint turns what it carries by a quaternion whose w is not negative. Beyond half a turn
     that is minus the one of its angle, and so are those of all that the joint carries.
+
+    Attributes:
+        hinges: Where the positions of hinges stand among MuJoCo's.
+        carried: How often each of them carries a body, (bodies, hinges).
     """
 
     def __init__(self, model: Any) -> None:
         """Look up which frames each joint carries."""
         hinges = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE)
-        self._qpos = model.jnt_qposadr[hinges]
-        self._carried = np.zeros((model.nbody, len(hinges)), np.int32)
+        self.hinges = model.jnt_qposadr[hinges]
+        self.carried = np.zeros((model.nbody, len(hinges)), np.int32)
         for body, parent in enumerate(model.body_parentid.tolist()):
-            self._carried[body] = self._carried[parent] + (model.jnt_bodyid[hinges] == body)
+            self.carried[body] = self.carried[parent] + (model.jnt_bodyid[hinges] == body)
 
     def turn(self, quaternions: Floats, qpos: Floats) -> None:
         """Turn quaternions round, in place.
@@ -198,9 +202,9 @@ class Turned:
             quaternions: Those of a world's frames, (F, 4).
             qpos: All of MuJoCo's positions of that world.
         """
-        beyond = np.cos(qpos[self._qpos] / 2) < 0
+        beyond = np.cos(qpos[self.hinges] / 2) < 0
         if beyond.any():
-            odd = self._carried[1:] @ beyond % 2 == 1
+            odd = self.carried[1:] @ beyond % 2 == 1
             quaternions[odd] *= -1
 
 

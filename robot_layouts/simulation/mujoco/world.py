@@ -33,6 +33,7 @@ class MujocoWorld:
         as_built: The same before the world was varied; worlds that are alike share it.
         data: MuJoCo's state of it.
         index: Where everything stands.
+        inner: How many steps of MuJoCo's make one of physics.
     """
 
     def __init__(self, declared: World, model: Any, index: Inventory, inner: int) -> None:
@@ -47,7 +48,7 @@ class MujocoWorld:
         self.declared, self.index = declared, index
         self.model = self.as_built = model
         self.data: Any = mujoco.MjData(model)
-        self._inner, self._current = inner, False
+        self.inner, self._current = inner, False
         self.before_each: Callable[[], None] | None = None
         self.after_each: Callable[[], None] | None = None
         for name, body in declared.bodies.items():
@@ -61,7 +62,7 @@ class MujocoWorld:
         """Advance by steps of physics; what the solver remembers is not carried over."""
         data, self._current = self.data, False
         data.qacc_warmstart[:] = 0.0
-        count = substeps * self._inner
+        count = substeps * self.inner
         if self.before_each is None and self.after_each is None:
             mujoco.mj_step(self.model, data, nstep=count)
             return

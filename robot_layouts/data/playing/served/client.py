@@ -225,7 +225,7 @@ def mapping_of(data: bytes | str, what: str) -> dict[Any, Any]:
         what: What that should be, for the message.
 
     Raises:
-        ValueError: If it is something else; the message goes on from the server's name.
+        ValueError: If it is no mapping; the message goes on from the server's name.
     """
     if isinstance(data, str):
         raise ValueError(f"sent a text, not {what}: {cut(_last_line(data), _SHOWN)}")
