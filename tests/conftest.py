@@ -34,8 +34,6 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("any machine")
 
-gc.disable()  # until all tests are collected, of which nothing is garbage
-
 REQUIRED = os.environ.get("ROBOT_LAYOUTS_REQUIRE_NATIVE") == "1"
 
 
@@ -134,13 +132,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         _put_groups_into_ids(items)
 
 
-def pytest_collection_finish(session: pytest.Session) -> None:
-    """Let the collector go through what tests make alone, not through all of them and all modules.
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Collect no garbage while tests are collected, and later only that of what tests make.
 
-    That takes half a second, and native does it whenever it builds a world.
+    To go through all tests and modules takes half a second, and native does it with every world.
     """
-    gc.enable()
-    gc.freeze()
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def _put_groups_into_ids(items: list[pytest.Item]) -> None:

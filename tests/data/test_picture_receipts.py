@@ -100,13 +100,12 @@ def test_who_plays_makes_no_difference(receipt, tmp_path, who):
 
 
 def test_pictures_of_each_so_many_th_step(receipt, tmp_path):
-    rare = Receipt.read(seen(tmp_path, picture_interval=2))
+    rare = Receipt.read(seen(tmp_path, picture_interval=2, seeds=[0]))
     every = Receipt.read(receipt)
     assert rare.pictures == {"interval": 2}
-    for one, other in zip(rare.episodes, every.episodes, strict=True):
-        for name in NAMES:
-            expected = other.picture_digests()[name][::2]
-            assert np.array_equal(one.picture_digests()[name], expected)
+    for name in NAMES:
+        expected = every.episodes[0].picture_digests()[name][::2]
+        assert np.array_equal(rare.episodes[0].picture_digests()[name], expected)
     assert again(rare, policy=looks).equal
     assert rare.hash != every.hash
 

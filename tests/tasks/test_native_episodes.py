@@ -38,7 +38,7 @@ def test_a_clone_is_native(task_id):
         results += compare(*both, [touching_episode(task_id, 1)], history="reused")
     assert complaints(results) == []
     if has_movable_bodies(task_id):
-        assert sum(result.contact_steps for result in results) >= 10, "hardly anything was touched"
+        assert sum(result.contact_steps for result in results) >= 5, "hardly anything was touched"
 
     for seed in SEEDS:
         native, ours = (side.reset([seed], [0], rebuild=False) for side in both)
