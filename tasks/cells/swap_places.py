@@ -40,7 +40,7 @@ class CellSwapPlaces(CellTask):
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}
     max_episode_steps = 350
     stages = {"is_one_held": 0.1, "is_red_away": 0.3, "is_blue_there": 0.6, "success": 1.0}
-    viewpoint = ((1.3, 1.0, 1.1), (0.0, 0.0, 0.0))
+    viewpoint = ((0.0, 1.5, 1.2), (0.0, 0.0, 0.0))
 
     place_south = place_east = place_west = Target(RADIUS)
     red, blue = Cube(HALF, RED), Cube(HALF, BLUE)
