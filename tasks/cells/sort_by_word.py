@@ -49,7 +49,7 @@ class CellSortByWord(CellTask):
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}
     max_episode_steps = 250
     stages = {"is_one_there": 0.3, "are_two_there": 0.6, "success": 1.0}
-    viewpoint = ((1.3, 1.0, 1.1), (0.0, 0.0, 0.0))
+    viewpoint = ((1.3, -0.75, 1.1), (0.0, 0.0, 0.0))
 
     pad_red, pad_green, pad_blue = (
         Cuboid((PAD, PAD, THICK), WHITE, kind="kinematic") for _ in range(3)

@@ -47,7 +47,7 @@ class CellStackInOrder(CellTask):
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}
     max_episode_steps = 300
     stages = {"is_one_held": 0.1, "is_one_placed": 0.4, "are_two_placed": 0.7, "success": 1.0}
-    viewpoint = ((1.2, 0.9, 0.9), (0.0, 0.0, 0.1))
+    viewpoint = ((1.2, -0.7, 0.9), (0.0, 0.0, 0.05))
 
     mark = Target(0.06)
     cube_red, cube_green, cube_blue = Cube(HALF, RED), Cube(HALF, GREEN), Cube(HALF, BLUE)
