@@ -1,5 +1,7 @@
 """What worlds on a device are read and driven by: the same as on the processor, as tensors."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
@@ -47,7 +49,10 @@ def states():
         env.step(torch.rand(2, 14) * 2 - 1)
     state, index = env.simulation.read(), env.simulation.index
     frames = index.frames - len(index.mean_frames)
-    built = Built(frames, dict(index.bodies), dict(index.robots), {})
+    order = tuple(reversed(range(env.layout["right"].robot.dof)))  # as if native had another
+    right = dataclasses.replace(index.robots["right"], loaded_order=order)
+    index.loaded_order["right"] = list(order)
+    built = Built(frames, dict(index.bodies), {**index.robots, "right": right}, {})
     device = DeviceIndex(env.layout, built, CPU)
     tensors = map(
         torch.from_numpy,
