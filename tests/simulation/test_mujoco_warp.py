@@ -1,11 +1,14 @@
 """What worlds on a device are read and driven by: the same as on the processor, as tensors."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import torch
 
 import tasks
 from layouts import single
+from robot_layouts.simulation import Box, PhysicsSettings, Simulation
 from robot_layouts.simulation.backend import Built
 from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.mujoco_warp.control import DevicePositions
@@ -13,6 +16,8 @@ from robot_layouts.simulation.mujoco_warp.state import DeviceIndex, DeviceState,
 from robot_layouts.simulation.mujoco_warp.tcp import DeviceFollower
 from robot_layouts.simulation.solvers import FOLLOWING, TreeFollower
 from robots import Fingers, RobotRegistry
+from robots.from_urdf import guess_descriptor
+from tests.robots.test_guessing import knuckles, single_arm
 
 CPU = torch.device("cpu")
 ROUNDING = 2e-6  # m, rad: of float32
@@ -44,7 +49,10 @@ def states():
         env.step(torch.rand(2, 14) * 2 - 1)
     state, index = env.simulation.read(), env.simulation.index
     frames = index.frames - len(index.mean_frames)
-    built = Built(frames, dict(index.bodies), dict(index.robots), {})
+    order = tuple(reversed(range(env.layout["right"].robot.dof)))  # as if native had another
+    right = dataclasses.replace(index.robots["right"], loaded_order=order)
+    index.loaded_order["right"] = list(order)
+    built = Built(frames, dict(index.bodies), {**index.robots, "right": right}, {})
     device = DeviceIndex(env.layout, built, CPU)
     tensors = map(
         torch.from_numpy,
@@ -121,3 +129,48 @@ def test_poses_are_followed_on_a_device_as_one_by_one():
             np.testing.assert_allclose(own.numpy(), expected[0], atol=1e-6)
     assert arrived[:-1].all()
     assert not arrived[-1]
+
+
+@pytest.mark.long
+def test_jaws_of_a_linkage_close_on_a_device_as_in_mujoco(tmp_path):
+    pytest.importorskip("mujoco_warp")
+    from robot_layouts.simulation.mujoco_warp.simulation import DeviceSimulation
+    from robot_layouts.simulation.mujoco_warp.worlds import Starts
+
+    parts, last = single_arm(end="")
+    knuckles(parts, last)
+    robot = guess_descriptor(parts.write(tmp_path), "made").descriptor
+    assert robot.action_split.groups["gripper"].leaders
+    layout, physics = single({"arm": robot}), PhysicsSettings()
+
+    def stood(build):
+        simulation = Simulation(layout, build, 1, physics, simulator="mujoco")
+        simulation.worlds[0].stand("arm", robot.keyframe("rest"))
+        return simulation, simulation.read()
+
+    _, state = stood(lambda world, number: None)
+    place = tuple(state.tcp_position("arm")[0].tolist())
+    turn = tuple(state.link_pose("arm", robot.tcp_link)[0, 3:].tolist())
+    block = Box(half_size=(0.03, 0.025, 0.03))
+    host, state = stood(
+        lambda world, number: world.add(
+            "block", block, kind="static", position=place, quaternion=turn
+        )
+    )
+    world = host.backend.worlds[0]
+    starts = Starts.of([world], CPU).without_constants(world.as_built)
+    device = DeviceSimulation(host, starts, 2)
+    everywhere = torch.ones(2, dtype=torch.bool)
+    device.begin(everywhere, starts.take(torch.zeros(2, dtype=torch.int64)))
+    seen = device.read()
+    device.hold(seen, everywhere)
+    action = np.zeros((1, robot.action_dim), np.float32)
+    action[0, -1] = -1.0
+    for _ in range(8):
+        host.step(action, state.joint_positions)
+        device.step(torch.from_numpy(np.repeat(action, 2, 0)), seen)
+        state, seen = host.read(), device.read()
+        found = seen.joint_positions.numpy()
+        np.testing.assert_allclose(found, np.repeat(state.joint_positions, 2, 0), atol=1e-5)
+    jaws = state.qpos("arm")[0, -6:]
+    assert np.abs(jaws).max() > 0.3  # they have closed as far as the block lets them

@@ -21,6 +21,8 @@ from tasks.interfaces.device import DeviceTask, chosen
 TASK = "PushCube-v1"
 STEPS = 4  # of an episode
 APART = 1e-4  # rad, m: how far float32 may be from MuJoCo's float64
+# At 1, drives of Pandas are at their limit of force to the last bit, on either side of it.
+SHORT = np.float32(0.99)
 OBSERVED = 2e-3  # of observations, which have speeds in them (rad/s)
 REFUSED = {
     "CellSetFaders-v1": "which instruction",
@@ -266,7 +268,7 @@ def test_every_task_goes_as_in_mujoco_or_is_refused(engine, task):
         closing(tasks.make(task, simulator="mujoco")) as host,
     ):
         seed = env.seeds[0]
-        plan = np.asarray(list(find_expert(task)(host, seed)), np.float32)
+        plan = SHORT * np.asarray(list(find_expert(task)(host, seed)), np.float32)
         env.reset(seed=[seed, seed])
         host.reset(seed)
         for action in plan[:10]:

@@ -17,7 +17,7 @@ _ANY = -1  # in the place of a body: whatever touches the link
 _AXES = 3  # numbers of a contact's force; what is beyond are moments
 
 
-class PairForces:
+class ContactForces:
     """Reads the contact forces of the same pairs, step after step."""
 
     def __init__(self, pairs: Sequence[Pair], model: Any, index: Inventory, device: str) -> None:

@@ -16,7 +16,7 @@ from robot_layouts.simulation.backend import Pair, Readout, Velocity
 from robot_layouts.simulation.mujoco.library import mujoco
 from robot_layouts.simulation.mujoco.world import MujocoWorld
 from robot_layouts.simulation.mujoco_warp.arrays import beside
-from robot_layouts.simulation.mujoco_warp.contacts import PairForces
+from robot_layouts.simulation.mujoco_warp.contacts import ContactForces
 from robot_layouts.simulation.mujoco_warp.library import mujoco_warp, warp
 from robot_layouts.simulation.mujoco_warp.linkages import LinkageDrives
 from robots import SimulationError
@@ -146,7 +146,7 @@ class DeviceWorlds:
         self._carried = torch.from_numpy(turned.carried.T.astype("float32")).to(device)
         self._roots = torch.from_numpy(model.body_rootid.astype("int64")).to(device)
         self._touched = torch.zeros(count, dtype=torch.bool, device=device)  # since its reset
-        self._forces: dict[tuple[Pair, ...], PairForces] = {}
+        self._forces: dict[tuple[Pair, ...], ContactForces] = {}
         self._found: dict[tuple[Velocity, ...], tuple[Tensor, Tensor]] = {}
         self._works: dict[str, Any] = {}  # graphs, None as long as there is none
         self._located = False
@@ -254,7 +254,7 @@ class DeviceWorlds:
     def forces(self, pairs: tuple[Pair, ...]) -> Any:
         """Return contact forces of the last step of physics, (P, N, 3) (N, world frame)."""
         if pairs not in self._forces:
-            self._forces[pairs] = PairForces(pairs, self._host, self._index, self._warp_device)
+            self._forces[pairs] = ContactForces(pairs, self._host, self._index, self._warp_device)
         with self._in_turn():
             forces = self._forces[pairs].read(self._data)
         return forces * self._touched[:, None]
