@@ -85,7 +85,7 @@ class Recipe:
     batch: int = 256
     learning_rate: float = 1e-3
     simulator: str = "sapien3"
-    options: ClassVar[tuple[str, ...]] = ()  # fields that the command line sets as well
+    options: ClassVar[tuple[str, ...]] = ("simulator",)  # fields that the command line sets, too
 
     @property
     def making(self) -> dict[str, Any]:
@@ -495,19 +495,18 @@ def main(
     add("--episodes", type=int, default=usual.episodes, help="to learn from (%(default)s)")
     add("--steps", type=int, default=usual.steps, help="batches to learn from (%(default)s)")
     add("--seed", type=int, default=usual.seed, help="of weights and batches (%(default)s)")
-    add("--simulator", default=usual.simulator, help="in which it learns (%(default)s)")
     add("--examined", type=int, default=25, help="episodes now and then (%(default)s)")
     add("--tests", type=int, default=100, help="test episodes (%(default)s)")
     for field in usual.options:
         value = getattr(usual, field)
-        add(f"--{field}", type=type(value), default=value, help="of pictures (%(default)s)")
+        add(f"--{field}", type=type(value), default=value, help="see the recipe (%(default)s)")
     add("--workers", type=int, help="processes that record (default: one per core)")
     add("--recording", type=Path, help="a recording that is there: folder, or hub:OWNER/NAME")
     add("--out", type=Path, help=f"folder (default: runs/{name}/TASK)")
     add("--log", help=f"also log the curve: {HOW}")
     options = parser.parse_args(arguments)
     sys.path.append(os.getcwd())  # for MODULE:ID of the present folder
-    fields = ("task", "episodes", "steps", "seed", "simulator", *usual.options)
+    fields = ("task", "episodes", "steps", "seed", *usual.options)
     recipe = policies.recipes(**{name: getattr(options, name) for name in fields})
     out = options.out or Path("runs") / name / options.task.rpartition(":")[2]
     try:

@@ -56,8 +56,7 @@ class PictureRecipe(Recipe):
     def making(self) -> dict[str, Any]:
         """How the task is made: arguments of `tasks.make`."""
         size = self.size, self.size
-        look = {"camera_size": size, "visuals": self.visuals}
-        return {**super().making, "obs_mode": OBSERVED, **look}
+        return {"obs_mode": OBSERVED, "camera_size": size, "visuals": self.visuals}
 
 
 @dataclass(frozen=True)
