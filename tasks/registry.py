@@ -26,6 +26,7 @@ CLONES = "tasks.maniskill."  # where the tasks that clone one of ManiSkill's are
 # One line per task, sorted by id: id -> module:class.
 CATALOGUE = {
     "CellBuildBridge-v1": "tasks.cells.build_bridge:CellBuildBridge",
+    "CellBuildGate-v1": "tasks.cells.build_gate:CellBuildGate",
     "CellCarryBeam-v1": "tasks.cells.carry_beam:CellCarryBeam",
     "CellCloseDrawers-v1": "tasks.cells.close_drawers:CellCloseDrawers",
     "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",

@@ -23,6 +23,7 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
     "CellBuildBridge-v1": "robot_layouts.experts.cells.build_bridge:build_bridge",
+    "CellBuildGate-v1": "robot_layouts.experts.cells.build_gate:build_gate",
     "CellCarryBeam-v1": "robot_layouts.experts.cells.carry_beam:carry_beam",
     "CellCloseDrawers-v1": "robot_layouts.experts.cells.close_drawers:close_drawers",
     "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
