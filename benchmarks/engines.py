@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from statistics import median
@@ -13,10 +14,14 @@ from tqdm import tqdm
 
 from benchmarks.records import DOCS, read_record, table, versions_of, write_page, write_record
 from robot_layouts.data.comparison import compare
+from robot_layouts.data.receipts import Receipt
+from robot_layouts.data.suite.results import wilson
 from robot_layouts.experts import find_expert, list_experts
 from robot_layouts.simulation.backend import SIMULATORS
 from robots import RobotLayoutsError
 from tasks import TaskEnv, get_task_class, make
+
+RECEIPTS = DOCS / "receipts" / "engines"  # of what learned in one engine and was played in one
 
 
 def engines(
@@ -60,8 +65,22 @@ def engines(
         table=shown,
         failures=failures,
         untried=untried,
+        learned=table(("learned in", *SIMULATORS), [*_learned()]),
     )
     return 0
+
+
+def _learned() -> Iterator[tuple[str, ...]]:
+    """Yield how many test episodes a policy solves in each engine, by that in which it learned."""
+    for source in SIMULATORS:
+        receipts = [Receipt.read(RECEIPTS / f"{source}-{name}.json") for name in SIMULATORS]
+        yield source, *(_solved(receipt) for receipt in receipts)
+
+
+def _solved(receipt: Receipt) -> str:
+    count, solved = len(receipt.episodes), sum(e.success for e in receipt.episodes)
+    low, high = (100 * share for share in wilson(solved, count))
+    return f"{solved} of {count} ({low:.1f} to {high:.1f} %)"
 
 
 def _of_the_library() -> list[str]:

@@ -70,6 +70,7 @@ class Recipe:
         blocks: How many pairs of layers it has.
         batch: Moments in a batch.
         learning_rate: At first, after 200 batches; it falls to 0.
+        simulator: In which it learns.
     """
 
     task: str
@@ -83,12 +84,13 @@ class Recipe:
     blocks: int = 3
     batch: int = 256
     learning_rate: float = 1e-3
-    options: ClassVar[tuple[str, ...]] = ()  # fields that the command line sets as well
+    simulator: str = "sapien3"
+    options: ClassVar[tuple[str, ...]] = ("simulator",)  # fields that the command line sets, too
 
     @property
     def making(self) -> dict[str, Any]:
-        """What is recorded beside states and actions: arguments of `tasks.make`."""
-        return {}
+        """How the task is made that is recorded: arguments of `tasks.make`."""
+        return {"simulator": self.simulator}
 
 
 def shaking(recipe: Recipe) -> Randomization:
@@ -147,7 +149,7 @@ class Observer:
     def __init__(self, recipe: Recipe, senses: Senses) -> None:
         """Make the task as it was recorded."""
         shaken = shaking(recipe)
-        how: dict[str, Any] = {"obs_mode": OBSERVED, "reward_mode": "none"}
+        how: dict[str, Any] = {**recipe.making, "obs_mode": OBSERVED, "reward_mode": "none"}
         self.env = tasks.make(recipe.task, randomization=shaken, **how)
         self._senses, self._arms = senses, list(_arms(self.env.layout))
 
@@ -310,7 +312,7 @@ class ClonedPolicy:
     @property
     def making(self) -> dict[str, Any]:
         """How the task is made that it plays: arguments of `tasks.make`."""
-        return {"control_mode": MODE, "obs_mode": OBSERVED}
+        return {**self.recipe.making, "control_mode": MODE, "obs_mode": OBSERVED}
 
     def sense(self, observation: Mapping[str, Any]) -> Any:
         """Return what the network gets of an observation."""
@@ -497,7 +499,7 @@ def main(
     add("--tests", type=int, default=100, help="test episodes (%(default)s)")
     for field in usual.options:
         value = getattr(usual, field)
-        add(f"--{field}", type=type(value), default=value, help="of pictures (%(default)s)")
+        add(f"--{field}", type=type(value), default=value, help="see the recipe (%(default)s)")
     add("--workers", type=int, help="processes that record (default: one per core)")
     add("--recording", type=Path, help="a recording that is there: folder, or hub:OWNER/NAME")
     add("--out", type=Path, help=f"folder (default: runs/{name}/TASK)")

@@ -4,8 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.quick import quick_cases
+
 pytest_plugins = ["pytester"]
 
+SKIPS = ["pytest.skip('later')", "pytest.importorskip('no_such_package')"]
 NATIVE_TEST = "import pytest\n@pytest.mark.native\ndef test_native(): {}\n"
 
 
@@ -46,7 +49,7 @@ def test_without_a_browser_it_is_skipped_or_fails_if_required(run, monkeypatch, 
     result.stdout.re_match_lines([r".*(there is no chromium|playwright is not installed)"])
 
 
-@pytest.mark.parametrize("how", ["pytest.skip('later')", "pytest.importorskip('no_such_package')"])
+@pytest.mark.parametrize("how", quick_cases(SKIPS, SKIPS[:1]))
 def test_a_skip_inside_the_test_fails_if_required(run, how):
     pass_first = "import pytest\n@pytest.mark.native\ndef test_other(): pass\n"
     result = run(pass_first + NATIVE_TEST.format(how), required=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from objects.descriptor import Grasp, NamedPoint
 from objects.shapes import Box, Color, ConvexHull, Cylinder, Finish, Friction, Place, Shape, linear
-from robot_layouts.kinematics.rotations import Floats, quaternion_of, rotation_about
+from robot_layouts.kinematics.rotations import Floats, cross, quaternion_of, rotation_about
 from robots.descriptor import IDENTITY, Quaternion
 
 Axis = tuple[float, float, float]
@@ -248,16 +248,17 @@ def grips(
         tilts: Turns of the gripper about ``along`` (rad).
         pitches: Turns about the way in which it closes, after those (rad).
     """
-    found: list[Grasp] = []
+    places, frames, normal = list[Place](), list[Floats](), np.cross(along, out)
     for offset, tilt, pitch in product(offsets, tilts, pitches):
         turned = rotation_about(along, tilt)
-        approach, closing = -(turned @ np.array(out)), turned @ np.cross(along, out)
+        approach, closing = -(turned @ np.array(out)), turned @ normal
         approach = rotation_about(_axis(closing), pitch) @ approach
-        place = _place(np.add(middle, np.multiply(along, offset)))
         for way in (closing, -closing):
-            frame = np.stack([np.cross(way, approach), way, approach], axis=1)
-            found.append(Grasp(place, _quaternion(frame), round(width, _DIGITS), part))
-    return found
+            places.append(_place(np.add(middle, np.multiply(along, offset))))
+            frames.append(np.stack([cross(way, approach), way, approach], axis=1))
+    turns = map(_rounded, quaternion_of(np.reshape(frames, (-1, 3, 3))))
+    pairs = zip(places, turns, strict=True)
+    return [Grasp(place, turn, round(width, _DIGITS), part) for place, turn in pairs]
 
 
 def from_above(
@@ -379,7 +380,11 @@ def _turn(ahead: Floats) -> Quaternion:
 
 
 def _quaternion(frame: Floats) -> Quaternion:
-    w, x, y, z = (round(number, _DIGITS) + 0.0 for number in quaternion_of(frame).tolist())
+    return _rounded(quaternion_of(frame))
+
+
+def _rounded(quaternion: Floats) -> Quaternion:
+    w, x, y, z = (round(number, _DIGITS) + 0.0 for number in quaternion.tolist())
     return w, x, y, z
 
 

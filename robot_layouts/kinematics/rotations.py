@@ -7,6 +7,7 @@ of the turned frame; poses homogeneous matrices, (…, 4, 4) (m). Leading axes b
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -90,10 +91,22 @@ def rotation_about(axis: Sequence[float], angle: ArrayLike) -> Floats:
         axis: Unit length, (3,).
         angle: (…) (rad).
     """
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    unit, first, second = _turning(*axis)
     angles = np.asarray(angle, float)[..., None, None]
-    return np.eye(3) + np.sin(angles) * cross + (1 - np.cos(angles)) * (cross @ cross)
+    return unit + np.sin(angles) * first + (1 - np.cos(angles)) * second
+
+
+@lru_cache(1024)
+def _turning(x: float, y: float, z: float) -> tuple[Floats, Floats, Floats]:
+    """Return what rotation matrices about an axis are made of: powers of its cross product."""
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], float)
+    return np.eye(3), cross, cross @ cross
+
+
+def cross(first: Floats, second: Floats) -> Floats:
+    """Return cross products, (…, 3): NumPy's to the last bit, but of few vectors much sooner."""
+    ahead, behind = [1, 2, 0], [2, 0, 1]
+    return first[..., ahead] * second[..., behind] - first[..., behind] * second[..., ahead]
 
 
 def rotation_vector(rotation: ArrayLike) -> Floats:

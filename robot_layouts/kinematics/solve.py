@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.kinematics.rotations import Floats, rotation_vector, transform
+from robot_layouts.kinematics.rotations import Floats, cross, rotation_vector, transform
 from robot_layouts.kinematics.tree import Tree
 
 SEED = 0
@@ -234,20 +234,20 @@ def _errors(tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int]) -> tupl
     """Return what is missing to the goal, (n, 3 or 6), and its slopes by the free coordinates."""
     poses = tree.forward(qpos)
     place = poses[:, goal.links][..., :3, 3].mean(axis=1)
+    moving = {link: tree.jacobian(poses, link, free) for link in {*goal.links, goal.turned}}
     slopes = np.zeros((len(qpos), 3, len(free)))
     for link in goal.links:
-        slopes += tree.jacobian(poses, link, free)[:, :3] / len(goal.links)
+        slopes += moving[link][:, :3] / len(goal.links)
     if goal.offset is not None:
         beside = poses[:, goal.turned, :3, :3] @ goal.offset
-        turning = tree.jacobian(poses, goal.turned, free)[:, 3:]
-        place, slopes = place + beside, slopes + np.cross(turning, beside[..., None], axis=1)
+        aside = cross(moving[goal.turned][:, 3:].transpose(0, 2, 1), beside[:, None])
+        place, slopes = place + beside, slopes + aside.transpose(0, 2, 1)
     if goal.rotation is None:
         return goal.position - place, slopes
     turn = rotation_vector(goal.rotation @ poses[:, goal.turned, :3, :3].transpose(0, 2, 1))
-    turning = tree.jacobian(poses, goal.turned, free)[:, 3:]
     return (
         np.concatenate([goal.position - place, turn], axis=1),
-        np.concatenate([slopes, turning], axis=1),
+        np.concatenate([slopes, moving[goal.turned][:, 3:]], axis=1),
     )
 
 

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.kinematics.rotations import Floats, rotation_about
+from robot_layouts.kinematics.rotations import Floats, cross, rotation_about
 
 FIXED = -1  # in ``drivers``: no coordinate moves the joint
+_STILL = np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +155,8 @@ class Tree:
             link: Index of the link that it carries.
             position: Joint positions, (…) (rad or m).
         """
-        motion = np.broadcast_to(np.eye(4), (*position.shape, 4, 4)).copy()
+        motion = np.empty((*position.shape, 4, 4))
+        motion[:] = _STILL
         if self.slides[link]:
             motion[..., :3, 3] = position[..., None] * self.axes[link]
         else:
@@ -180,17 +182,20 @@ class Tree:
         chosen = range(len(self.coordinates)) if coordinates is None else coordinates
         column = {coordinate: i for i, coordinate in enumerate(chosen)}
         linear, angular = np.zeros((2, len(poses), len(column), 3))  # of a point at the root
-        for at in self.path(link):
-            i = column.get(int(self.drivers[at]))
-            if i is None or self.drivers[at] == FIXED:
-                continue
-            axis = self.multipliers[at] * (poses[:, at, :3, :3] @ self.axes[at])
+        driven = [at for at in self.path(link) if self.drivers[at] != FIXED]
+        moving = [at for at in driven if self.drivers[at] in column]
+        axes = np.empty((len(poses), len(moving), 3))
+        for k, at in enumerate(moving):
+            axes[:, k] = self.multipliers[at] * (poses[:, at, :3, :3] @ self.axes[at])
+        ways = cross(poses[:, moving][..., :3, 3], axes)
+        for k, at in enumerate(moving):
+            i = column[self.drivers[at]]
             if self.slides[at]:
-                linear[:, i] += axis
+                linear[:, i] += axes[:, k]
             else:
-                angular[:, i] += axis
-                linear[:, i] += np.cross(poses[:, at, :3, 3], axis)
-        linear += np.cross(angular, poses[:, link, None, :3, 3])
+                angular[:, i] += axes[:, k]
+                linear[:, i] += ways[:, k]
+        linear += cross(angular, poses[:, link, None, :3, 3])
         return np.concatenate([linear.transpose(0, 2, 1), angular.transpose(0, 2, 1)], axis=1)
 
     @cached_property

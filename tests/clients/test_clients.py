@@ -20,6 +20,7 @@ CLIENTS = (
     "supersuit",
     "tianshou",
     "torchrl",
+    "vla_eval",
 )
 LARGE = {  # that bring gigabytes of CUDA, and are not installed for a test
     "robomimic": "robomimic needs torchvision, which fits no CPU build of torch from the index",

@@ -16,10 +16,12 @@ from robot_layouts.data.recording.record import record
 from tests.data import recordings
 from tests.data.test_recorded_observations import LENGTHS, by_name, differences, observed_again
 from tests.native import NATIVE
+from tests.quick import quick_cases
 
 pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 
 MODE = "rgb+segmentation+state_dict"
+REPLAYED = ("state", "state_dict", "rgb", "rgb+segmentation", "rgb+depth+state", "pointcloud")
 SIZE = {"width": 48, "height": 32}
 
 
@@ -29,7 +31,7 @@ def pushed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recordings.record(path, "PushCube-v1", LENGTHS)
 
 
-@pytest.mark.parametrize("mode", ["state", MODE])
+@pytest.mark.parametrize("mode", quick_cases(["state", MODE], [MODE]))
 def test_a_file_holds_what_natives_wrapper_writes(pushed: Path, tmp_path: Path, mode: str):
     with quiet():
         from mani_skill.utils.wrappers.record import RecordEpisode
@@ -82,9 +84,7 @@ def contents(group: Any, name: str = "") -> list[tuple[str, Any]]:
     return found
 
 
-@pytest.mark.parametrize(
-    "mode", ["state", "state_dict", "rgb", "rgb+segmentation", "rgb+depth+state", "pointcloud"]
-)
+@pytest.mark.parametrize("mode", quick_cases(REPLAYED, ["rgb+depth+state"]))
 def test_a_file_is_what_natives_own_replay_makes(pushed: Path, tmp_path: Path, mode: str):
     path = observed_again(pushed, tmp_path / "seen", mode, "--camera-size", "48x32")
     native = replayed_by_native(pushed, tmp_path / "native", mode)
@@ -100,6 +100,7 @@ def test_a_file_is_what_natives_own_replay_makes(pushed: Path, tmp_path: Path, m
                     assert np.array_equal(a[-1], b[-1]), key
 
 
+@pytest.mark.long
 def test_what_an_expert_is_recorded_with_is_what_native_makes_of_it(tmp_path: Path):
     plain, seen = tmp_path / "plain", tmp_path / "seen"
     record("PushCube-v1", [4], plain, workers=0)

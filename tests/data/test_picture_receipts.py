@@ -100,13 +100,12 @@ def test_who_plays_makes_no_difference(receipt, tmp_path, who):
 
 
 def test_pictures_of_each_so_many_th_step(receipt, tmp_path):
-    rare = Receipt.read(seen(tmp_path, picture_interval=2))
+    rare = Receipt.read(seen(tmp_path, picture_interval=2, seeds=[0]))
     every = Receipt.read(receipt)
     assert rare.pictures == {"interval": 2}
-    for one, other in zip(rare.episodes, every.episodes, strict=True):
-        for name in NAMES:
-            expected = other.picture_digests()[name][::2]
-            assert np.array_equal(one.picture_digests()[name], expected)
+    for name in NAMES:
+        expected = every.episodes[0].picture_digests()[name][::2]
+        assert np.array_equal(rare.episodes[0].picture_digests()[name], expected)
     assert again(rare, policy=looks).equal
     assert rare.hash != every.hash
 
@@ -120,8 +119,8 @@ def test_an_expert_whose_plan_was_rehearsed(tmp_path):
     assert again(path).equal
 
 
-def test_other_light_is_found_and_shown(receipt, tmp_path, monkeypatch):
-    """The states are the same: a plan does not see."""
+def test_other_light_is_found_and_shown(tmp_path, monkeypatch):
+    """The states are the same: a plan does not see. Of a kept file that is damaged nothing is."""
     path = seen(tmp_path, policy=plan, keep_pictures=True)
     monkeypatch.setattr(studio, "SKY", (0.3, 0.3, 0.35))
     found = again(path, policy=plan)
@@ -144,6 +143,10 @@ def test_other_light_is_found_and_shown(receipt, tmp_path, monkeypatch):
     assert np.array_equal(now, difference.pictures[0].here)
     assert np.array_equal((then != now).any(-1), different[..., 0] == 255)
     assert (then != now).any()
+    kept_of_first = next(pictures_folder(path).glob("seed_0*"))
+    kept_of_first.write_bytes(kept_of_first.read_bytes()[:-100])
+    shown = found.write_pictures(tmp_path / "alone", pictures_folder(path))
+    assert [_read(one).shape[1] for one in shown] == [24, 24, 3 * 24, 3 * 24]
 
 
 def test_the_step_of_the_first_picture_that_differs(receipt, tmp_path, capsys):
@@ -171,16 +174,6 @@ def test_the_step_of_the_first_picture_that_differs(receipt, tmp_path, capsys):
     file = tmp_path / "changed.differences" / "seed_1_step_3_hand_camera_rgb.png"
     assert printed.endswith(f"{file}\n")
     assert _read(file).shape == (16, 24, 3)  # alone
-
-
-def test_kept_pictures_that_cannot_be_read_are_not_shown(tmp_path, monkeypatch):
-    path = seen(tmp_path, policy=plan, seeds=[0], keep_pictures=True)
-    (file,) = pictures_folder(path).iterdir()
-    file.write_bytes(file.read_bytes()[:-100])
-    monkeypatch.setattr(studio, "SKY", (0.3, 0.3, 0.35))
-    found = again(path, policy=plan)
-    shown = found.write_pictures(tmp_path / "out", pictures_folder(path))
-    assert [_read(one).shape for one in shown] == [(16, 24, 3)] * 2
 
 
 def test_a_kept_file_that_claims_more_than_it_holds_is_not_shown(tmp_path):

@@ -136,6 +136,7 @@ with Recorder(sys.argv[1], env) as recorder:
 """
 
 
+@pytest.mark.long
 def test_a_killed_recording_keeps_its_finished_episodes(tmp_path):
     path = tmp_path / "killed.h5"
     with subprocess.Popen(

@@ -54,13 +54,14 @@ def test_observations_are_the_same_whoever_plays(pushed: Path, tmp_path: Path, c
 def test_what_was_recorded_before_is_not_played(pushed: Path, tmp_path: Path, capsys):
     assert replay(pushed, tmp_path, "--episodes=2") == 0
     capsys.readouterr()
-    assert replay(pushed, tmp_path, "--workers=1") == 0
+    assert replay(pushed, tmp_path) == 0
     captured = capsys.readouterr()
     assert "2 of 5 episodes were recorded before" in captured.err
     assert "3 of 3 episodes end as recorded" in captured.out
     assert replay(pushed, tmp_path) == 0  # nothing is left to play
 
 
+@pytest.mark.long
 def test_an_episode_that_differs_is_left_out_by_workers_too(pushed: Path, tmp_path: Path, capsys):
     path = record_at_random(tmp_path / "changed" / FILE, "PushCube-v1", [4, 3, 5])
     with edited(path) as file:

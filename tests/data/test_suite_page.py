@@ -9,10 +9,11 @@ from robot_layouts.__main__ import main
 from robot_layouts.data.receipts.receipt import EpisodeReceipt, Receipt
 from robot_layouts.data.receipts.verification import verify
 from robot_layouts.data.suite.clips import worst_seeds
-from robot_layouts.data.suite.page import PAGE, RUNS, TABLES
+from robot_layouts.data.suite.page import PAGE, RUNS, TABLES, write_page
 from robot_layouts.data.suite.run import begin_run, read_run, receipt_path, run_suite
 from robot_layouts.data.suite.suite import Case, Suite
 from robot_layouts.data.video import video_problem
+from robots import TaskError
 from tests.data.suites import made_run, receipt
 
 STILL = "tests.data.policies:still"
@@ -107,6 +108,8 @@ def test_a_page_takes_the_place_of_a_page_alone(played, tmp_path, capsys):
     for place in (out, played.parent):
         assert report(played, f"--out={place}") == 1
         assert "holds something else; a report needs a folder" in capsys.readouterr().err
+    with pytest.raises(TaskError, match="holds something else"):
+        write_page(out, [])
     assert (out / "thesis.tex").exists()
 
 

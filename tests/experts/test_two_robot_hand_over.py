@@ -16,13 +16,6 @@ TASK = "TwoRobotHandOver-v1"
 expert = find_expert(TASK)
 
 
-def test_two_pandas_hand_over():
-    env = tasks.make(TASK)
-    episode = play(env, 0, expert(env, 0))
-    assert episode.solved
-    assert len(episode.actions) < 150
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("pair", [("so100", "so100"), ("so101", "so101"), ("panda", "so100")])
 def test_small_and_mixed_pairs_hand_over(pair: tuple[str, str]):

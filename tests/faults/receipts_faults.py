@@ -234,6 +234,7 @@ _FIELDS: dict[Place, Any] = {
     (*_EPISODE, "states"): None,
     (*_EPISODE, "trace"): 5,
     (*_EPISODE, "reason"): None,
+    (*_EPISODE, "stage_score"): 1.5,
 }
 
 # Every kind of value, in one field that has it, with what is nearly one.
@@ -337,6 +338,7 @@ _FILES: dict[str, Callable[[Path], object]] = {
 _LIES: dict[str, Callable[[Any], object]] = {
     "one success more": _set((*_EPISODE, "success"), True),
     "a higher return": _set((*_EPISODE, "total"), 1e300),
+    "stages that its task lacks": _set((*_EPISODE, "stage_score"), 1.0),
     "other states": _set((*_EPISODE, "states"), HEX),
     "a trace of other states": _set((*_EPISODE, "trace"), "AAAAAAAAAAA="),
     "another seed": _set((*_EPISODE, "seed"), 4_000_000_000),

@@ -48,6 +48,12 @@ def test_vectors_are_turned_as_by_matrices():
     np.testing.assert_allclose(back, vectors, atol=1e-12)
 
 
+def test_cross_products_are_numpys():
+    one, other = np.random.default_rng(0).normal(size=(2, COUNT, 3))
+    np.testing.assert_array_equal(rotations.cross(one, other), np.cross(one, other))
+    np.testing.assert_array_equal(rotations.cross(one[0], other), np.cross(one[0], other))
+
+
 def test_matrices_and_quaternions_are_the_same_turns():
     turns = random_rotations()
     np.testing.assert_allclose(rotations.rotation_of(wxyz(turns)), turns.as_matrix(), atol=1e-12)

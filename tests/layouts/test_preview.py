@@ -50,11 +50,10 @@ LAYOUTS = {
 }
 
 
-def pixels(layout):
-    """Draw a layout; return the image, and the pixel (row, column) of each robot's base."""
+def pixels(layout, figure):
+    """Draw a figure; return the image, and the pixel (row, column) of each robot's base."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    figure = draw(layout)
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     image = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
@@ -71,24 +70,30 @@ def texts(figure):
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_every_robot_is_drawn_at_its_place(name):
-    image, places = pixels(LAYOUTS[name])
+def test_every_robot_is_drawn_at_its_place_and_named_with_its_reach(name):
+    layout = LAYOUTS[name]
+    figure = draw(layout)
+    image, places = pixels(layout, figure)
     for row, column in places.values():
         around = image[row - 20 : row + 20, column - 20 : column + 20]
         colourful = around.max(axis=-1) - around.min(axis=-1) > 80
         assert colourful.mean() > 0.05
     assert (image[:10] == 255).all()
-
-
-@pytest.mark.parametrize("name", LAYOUTS)
-def test_names_robots_and_action_numbers_are_written(name):
-    layout = LAYOUTS[name]
-    written = texts(draw(layout))
+    written = texts(figure)
     for place, placement in layout.items():
         part = layout.action_split[place]
         assert place in written
         assert placement.robot.name in written
         assert f"{part.start}:{part.stop}" in written
+    plan = figure.axes[0]
+    (x_min, x_max), (y_min, y_max) = plan.get_xlim(), plan.get_ylim()
+    for placement in layout.values():
+        x, y, _ = placement.base_position
+        reach = placement.robot.reach
+        assert x_min < x - reach < x + reach < x_max
+        assert y_min < y - reach < y + reach < y_max
+    box = plan.get_window_extent()  # metres are square
+    assert box.width / (x_max - x_min) == pytest.approx(box.height / (y_max - y_min), rel=1e-6)
 
 
 def test_long_names_fit_into_the_list_and_the_plan():
@@ -101,26 +106,10 @@ def test_long_names_fit_into_the_list_and_the_plan():
         assert plan.bbox.x0 < text.get_window_extent().x0
 
 
-@pytest.mark.parametrize("name", LAYOUTS)
-def test_reach_circles_lie_inside_the_plan_and_metres_are_square(name):
-    layout = LAYOUTS[name]
-    figure = draw(layout)
-    figure.canvas.draw()
-    plan = figure.axes[0]
-    (x_min, x_max), (y_min, y_max) = plan.get_xlim(), plan.get_ylim()
-    for placement in layout.values():
-        x, y, _ = placement.base_position
-        reach = placement.robot.reach
-        assert x_min < x - reach < x + reach < x_max
-        assert y_min < y - reach < y + reach < y_max
-    box = plan.get_window_extent()
-    assert box.width / (x_max - x_min) == pytest.approx(box.height / (y_max - y_min), rel=1e-6)
-
-
 def test_overlap_is_darker_than_what_one_robot_reaches():
     near = face_to_face({"left": "panda", "right": "panda"}, spacing=1.2)
     figure = draw(near)
-    image, _ = pixels(near)
+    image, _ = pixels(near, figure)
     in_overlap, in_one = (
         image[len(image) - round(y), round(x)].sum()
         for x, y in figure.axes[0].transData.transform([(0.1, 0.1), (0.1, 1.1)])
@@ -199,7 +188,7 @@ def test_a_failed_save_keeps_the_old_picture(monkeypatch, tmp_path):
 
 def test_a_table_of_frames_is_drawn():
     layout = around_table({"arm": "panda"}, table=(2.0, 1.0)).moved(yaw=0.3)
-    image, _ = pixels(layout)
+    image, _ = pixels(layout, draw(layout))
     on_table, off_table = (
         image[len(image) - round(y), round(x)].tolist()
         for x, y in draw(layout).axes[0].transData.transform([(0.74, 0.648), (-0.9, 0.4)])

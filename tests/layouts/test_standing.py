@@ -16,6 +16,12 @@ TWO = face_to_face({"left": "panda", "right": "panda"}, spacing=1.5)
 DUAL = RobotRegistry.load("mobile_panda_dual")
 
 
+@pytest.fixture(scope="module")
+def ready():
+    """Where the body stands whose arms serve both roles."""
+    return at_task(DUAL, TWO)
+
+
 def test_the_robots_of_the_task_stay_where_they_are():
     assert at_task("panda", TWO) == TWO
     assert at_task({"right": "panda"}, TWO) == TWO
@@ -33,12 +39,11 @@ def test_a_shorter_arm_stands_nearer():
     assert (round(x, 2), y) == (-round(0.72 * RobotRegistry.load("so100").reach, 2), 0.0)
 
 
-def test_the_arms_of_one_body_serve_the_roles_called_like_them():
-    layout = at_task("mobile_panda_dual", TWO)
-    (placement,) = layout.values()
+def test_the_arms_of_one_body_serve_the_roles_called_like_them(ready):
+    (placement,) = ready.values()
     assert placement.robot == DUAL
     np.testing.assert_allclose(placement.base_position, (0.56, 0.0, -0.04), atol=0.01)
-    assert layout.arm("left").base_position[1] < 0 < layout.arm("right").base_position[1]
+    assert ready.arm("left").base_position[1] < 0 < ready.arm("right").base_position[1]
 
 
 def test_limbs_of_other_names_are_called_like_the_roles():
@@ -53,16 +58,15 @@ def test_limbs_of_other_names_are_called_like_the_roles():
     assert robot.parts["right"].action_split == DUAL.parts["right"].action_split
 
 
-def test_a_body_whose_files_are_missing_is_put_by_reach_alone(monkeypatch: pytest.MonkeyPatch):
+def test_a_body_whose_files_are_missing_is_put_by_reach_alone(ready, monkeypatch):
     def missing(*_: object, **__: object) -> NoReturn:
         raise AssetError("no files")
 
     monkeypatch.setattr(UrdfLocator, "locate", missing)
     alone = at_task(DUAL, TWO)["robot"]
     monkeypatch.undo()
-    ready = at_task(DUAL, TWO)["robot"]
-    assert alone == replace(ready, qpos=None)
-    assert ready.start_qpos != alone.start_qpos
+    assert alone == replace(ready["robot"], qpos=None)
+    assert ready["robot"].start_qpos != alone.start_qpos
 
 
 def test_what_does_not_fit_is_refused():

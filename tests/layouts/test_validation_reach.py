@@ -17,8 +17,10 @@ from robots import RobotRegistry, UnknownNameError
 from robots.bodies.hulls import load_model
 from tests.catalogue import every_robot
 from tests.layouts.small_robots import turntable
+from tests.quick import quick_cases
 
 BASE = (0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6)
+PANDAS = ("panda", "panda_stick", "panda_wristcam")
 seeds = st.integers(0, 2**32 - 1)
 each_robot = pytest.mark.parametrize("robot", every_robot())
 
@@ -80,7 +82,7 @@ class TestReach:
             assert np.linalg.norm(found - place) < 1.1e-3
             assert ((solution >= limits[:, 0]) & (solution <= limits[:, 1])).all()
 
-    @pytest.mark.parametrize("robot", ["panda", "panda_stick", "panda_wristcam"])
+    @pytest.mark.parametrize("robot", quick_cases(PANDAS, PANDAS[-1:]))
     def test_poses_near_the_keyframe_are_reached_with_their_orientation(self, robot):
         rest = np.array(placement(robot).start_qpos)
         solved = 0

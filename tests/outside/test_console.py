@@ -69,6 +69,7 @@ def test_a_wrong_word_gets_its_closest_match(capsys, words, near):
     assert f"Did you mean {near!r}?" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_files_of_the_user_hide_nothing_from_it(tmp_path):
     folder = make_folder(tmp_path, shadows=True)
     codes, printed = run(folder, "record --help", "tasks describe --help", "robots inspect panda")
@@ -135,15 +136,6 @@ class TestNew:
     def test_task_of_any_robots(self, tmp_path, robots):
         assert main(["new", "task", "Reach", "--out", str(tmp_path), "--robots", *robots]) == 0
         assert "3 passed" in self.pytest(tmp_path).stdout
-
-    @pytest.mark.long
-    def test_robot_writes_files_that_run(self, tmp_path):
-        from robots import RobotRegistry
-
-        urdf = str(RobotRegistry.load("xarm7").urdf.locate())
-        assert main(["new", "robot", urdf, "--name", "my_arm", "--out", str(tmp_path)]) == 0
-        done = self.pytest(tmp_path)
-        assert "5 passed" in done.stdout, done.stdout + done.stderr
 
     @pytest.mark.parametrize(
         ("name", "robot", "words"),

@@ -4,6 +4,8 @@ import subprocess
 import sys
 from importlib.util import find_spec
 
+import pytest
+
 import robot_layouts as rl
 from robot_layouts import _HOMES
 
@@ -23,6 +25,7 @@ def _is_module(name: str) -> bool:
         return False
 
 
+@pytest.mark.long
 def test_view_is_a_function_when_what_views_was_imported_first():
     code = "import robot_layouts.data.viewing, robot_layouts as rl; print(callable(rl.view))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

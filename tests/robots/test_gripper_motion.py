@@ -25,7 +25,9 @@ def test_how_wide_it_opens(name: str, widest: float):
     assert (np.diff(motion.openings) > 0).all()
 
 
-@pytest.mark.parametrize("name", ["panda", "so100", "koch", "baxter"])
+@pytest.mark.parametrize(
+    "name", ["panda", "so100", "koch", pytest.param("baxter", marks=pytest.mark.long)]
+)
 def test_a_share_gives_the_opening_that_was_asked_for(name: str):
     motion = gripper_motion(load(name))
     opening = 0.6 * motion.widest

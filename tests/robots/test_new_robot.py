@@ -53,6 +53,7 @@ def test_its_name_is_enough_on_a_command_line(folder, capsys):
     assert capsys.readouterr().out.count("right  made") == 2
 
 
+@pytest.mark.long
 def test_the_tests_that_it_writes_pass(folder):
     shutil.copytree(RobotRegistry.load("panda").urdf.locate().parent, folder / "panda")
     (urdf,) = (folder / "panda").glob("panda_v2.urdf")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -154,13 +152,3 @@ def test_a_urdf_of_one_link_is_no_robot(tmp_path):
     urdf.write_text(robot(link("base")))
     with pytest.raises(AssetError, match="describes a single link; a robot has at least one joint"):
         read_blueprint(descriptor(urdf), visuals=False)
-
-
-def test_a_robot_is_built_without_sapiens_reader_of_urdfs():
-    code = (
-        "import sys, tasks\n"
-        "tasks.make('TwoRobotPickCube-v1')\n"
-        "print([m for m in sys.modules if 'urchin' in m or 'urdf_loader' in m])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"

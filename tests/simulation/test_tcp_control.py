@@ -15,6 +15,7 @@ from robot_layouts.simulation import PhysicsSettings, Simulation
 from robot_layouts.simulation.checks.tcp_control import ERROR, TcpTrial, try_tcp_control
 from robot_layouts.simulation.control.approximate import nearest_turns
 from robots import RobotDescriptor, RobotRegistry
+from tests.quick import quick_cases
 
 DELTA, TARGET, POSE = "pd_ee_delta_pose", "pd_ee_target_delta_pose", "pd_ee_pose"
 AXES = {5: "zyyyz", 6: "zyyxyx", 7: "zyzyzyz"}  # of the joints, from the base
@@ -81,7 +82,7 @@ def test_the_nearest_turns():
     assert nearest_turns(np.array([0.0, 3.1]), np.zeros(2), limits) is None
 
 
-@pytest.mark.parametrize("name", ["so100", "koch"])
+@pytest.mark.parametrize("name", quick_cases(["so100", "koch"], ["koch"]))
 def test_arms_of_five_joints_follow_a_square(name):
     for trial in try_tcp_control(RobotRegistry.load(name), [TARGET]):
         assert trial.problem is None
@@ -96,7 +97,7 @@ def test_the_place_comes_before_the_orientation(tmp_path):
     assert trial.turn_reported > 0.05
 
 
-@pytest.mark.parametrize("count", [5, 6])
+@pytest.mark.parametrize("count", quick_cases([5, 6], [5]))
 def test_the_end_of_reach_is_told(tmp_path, count):
     simulation = alone(arm(tmp_path, count, BENT[count]), DELTA)
     way, (away, _) = went(simulation, [0, 0, 1] + [0] * 3, 40)

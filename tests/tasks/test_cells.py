@@ -1,5 +1,6 @@
 """What cells share: places before arms, what is inside something, what the instruction chooses."""
 
+from contextlib import closing
 from math import hypot, sqrt
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,10 @@ import pytest
 import layouts
 import tasks
 from tasks import CellTask
+from tasks.cells.press_in_order import order_of
+from tasks.cells.take_sides import SIDES
 from tasks.language.fitting import AS_DECLARED
+from tests.tasks.own import put
 
 ARMS = ("first", "second", "third")
 RING: Any = SimpleNamespace(
@@ -50,3 +54,55 @@ def test_the_instruction_says_what_counts_and_the_observation_does_not():
         "lever",
     }
     env.close()
+
+
+def test_buttons_count_in_their_order_alone():
+    env = tasks.make("CellPressInOrder-v1")
+    env.reset(seed=1)  # from the south-east on, clockwise
+    order, world = order_of(1), env.simulation.worlds[0]
+    assert order[:3] == ("southeast", "south", "southwest")
+
+    def press(pressed: str) -> Any:
+        for arm in order:
+            world.set_joints(f"button_{arm}", cap=0.008 if arm == pressed else 0.0)
+        return env.task.evaluate(env.simulation.read())
+
+    half = [press(arm)["are_half_pressed"].item() for arm in order[:4]]
+    assert half == [False, False, False, True]
+    assert not press(order[6])["is_first_pressed"].item()  # too early: it starts over
+    assert [press(arm)["success"].item() for arm in order] == [False] * 7 + [True]
+    env.close()
+
+
+def test_cubes_are_swapped_once_both_lie_where_the_other_one_began():
+    env = tasks.make("CellSwapPlaces-v1")
+    env.reset(seed=0)
+    start = {cube: env.state.position(cube)[0].tolist() for cube in ("red", "blue")}
+    found = []
+    for cube, other in (("red", "blue"), ("blue", "red")):
+        found.append(env.task.evaluate(env.simulation.read())["success"].item())
+        env.simulation.worlds[0].set_pose(cube, start[other])
+    assert found == [False, False]
+    assert env.task.evaluate(env.simulation.read())["success"].item()
+    env.close()
+
+
+@pytest.mark.parametrize(("side", "solved"), [(0, True), (1, False)])
+def test_blocks_belong_on_the_side_that_is_told(side: int, solved: bool):
+    env = tasks.make("CellTakeSides-v1")
+    env.reset(seed=4)
+    for arm, told in zip(env.layout.arms, SIDES[4], strict=True):
+        mark = (told, {"left": "right", "right": "left"}[told])[side]
+        x, y, _ = env.state.position(f"{mark}_{arm}")[0].tolist()
+        env.simulation.worlds[0].set_pose(f"block_{arm}", (x, y, 0.025))
+    assert env.task.evaluate(env.simulation.read())["success"].item() is solved
+    env.close()
+
+
+def test_the_instruction_says_in_which_order_cubes_are_stacked():
+    with closing(tasks.make("CellStackInOrder-v1", num_envs=2)) as env:
+        words = env.reset(seed=0)[1]["instruction"]
+        assert ["red at the bottom, then green" in each for each in words] == [True, False]
+        low, middle, high = (0.0, 0.0, 0.021), (0.0, 0.0, 0.061), (0.0, 0.0, 0.101)
+        info = put(env, mark=(0.0, 0.0, 0.001), cube_red=low, cube_green=middle, cube_blue=high)
+        assert info["success"].tolist() == [True, False]

@@ -173,11 +173,18 @@ def test_a_script_names_limbs_not_their_robot(env):
 HAND_OVER = "TwoRobotHandOver-v1"
 
 
-def test_a_body_stands_behind_the_table_with_its_hands_over_it():
+@pytest.fixture(scope="module")
+def body():
     env = tasks.make(HAND_OVER, robots="mobile_panda_dual", obs_mode="none")  # collides nowhere
-    placement, table = env.layout["robot"], env.task.table.outline(env.layout)
+    yield env
+    env.close()
+
+
+def test_a_body_stands_behind_the_table_with_its_hands_over_it(body):
+    body.reset(seed=0)
+    placement, table = body.layout["robot"], body.task.table.outline(body.layout)
     assert placement.base_position[0] > table[2] + 0.15  # half its column
-    state, frame = env.simulation.read(), env.task.fit
+    state, frame = body.simulation.read(), body.task.fit
     for place, side in (("left", -1), ("right", 1)):
         x, y, z = state.tcp_position(place)[0]
         assert x == pytest.approx(frame.x, abs=0.05)
@@ -187,20 +194,19 @@ def test_a_body_stands_behind_the_table_with_its_hands_over_it():
     assert table[0] < frame.x < table[2]
 
 
-def test_a_body_where_the_task_says_no_table_is_put_by_reach_alone():
+def test_a_body_where_the_task_says_no_table_is_put_by_reach_alone(body):
     own = tasks.get_task_class(HAND_OVER)
-    behind, nowhere = at_task("mobile_panda_dual", own), at_task("mobile_panda_dual", own.layout)
+    behind, nowhere = body.layout, at_task("mobile_panda_dual", own.layout)
     assert nowhere["robot"].base_position[0] < behind["robot"].base_position[0]
     assert nowhere["robot"].base_position[2] == behind["robot"].base_position[2]
 
 
-def test_a_body_drifts_nowhere_while_its_arm_moves():
-    env = tasks.make(HAND_OVER, robots="mobile_panda_dual", obs_mode="none")
-    env.reset(seed=0)
-    before = env.simulation.read().qpos("robot")[0, 18:].copy()
+def test_a_body_drifts_nowhere_while_its_arm_moves(body):
+    body.reset(seed=0)
+    before = body.simulation.read().qpos("robot")[0, 18:].copy()
     for _ in range(10):
-        env.step(env.single_action_space.high[None])
-    assert np.abs(env.simulation.read().qpos("robot")[0, 19:] - before[1:]).max() < 1e-3
+        body.step(body.single_action_space.high[None])
+    assert np.abs(body.simulation.read().qpos("robot")[0, 19:] - before[1:]).max() < 1e-3
 
 
 @pytest.mark.long

@@ -15,6 +15,7 @@ import torch
 import tasks
 from parity.native import make_native, native_action, native_action_dim, quiet
 from tests.native import NATIVE
+from tests.quick import quick_cases
 from tests.tasks.test_native_cameras import EVERYTHING, differences, our_look
 
 pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
@@ -86,11 +87,10 @@ def our_differences(look: Look, task_id: str, obs_mode: str, **making: Any) -> l
 
 @pytest.mark.parametrize(
     "what",
-    [
-        pytest.param(name, marks=pytest.mark.long) if "for all" in name else name
-        for name in SETTINGS
-        if "rays" not in name
-    ],
+    quick_cases(
+        [name for name in SETTINGS if "rays" not in name],
+        ["pose, view and size", "slower shaders for one camera"],
+    ),
 )
 def test_settings_by_name_are_native_s(what: str):
     sensors = unit(SETTINGS[what])
@@ -117,7 +117,7 @@ def test_traced_rays_are_native_s(shaders: str):
     assert our_differences(look, "PickCube-v1", "rgb+normal", **making) == []
 
 
-@pytest.mark.parametrize("shaders", ["minimal", "default"])
+@pytest.mark.parametrize("shaders", quick_cases(["minimal", "default"], ["minimal"]))
 def test_shadows_and_the_picture_for_people_are_native_s(shaders: str):
     making = {
         "enable_shadow": True,

@@ -6,7 +6,7 @@ import pytest
 
 import tasks
 from parity.episodes import random_episodes
-from parity.lockstep import HISTORIES, differing
+from parity.lockstep import HISTORIES, compare, differing
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
 
@@ -33,13 +33,12 @@ def test_a_clone_is_native(task_id):
 
     [random] = random_episodes([1], 60, both.ours.action_dim)
     assert abs(random.actions).max() > 2, "no action beyond the range"
-    played = [random, touching_episode(task_id, 1)]
-    results = both.play(played, "reused")
+    results = both.play([random], "reused")
     with both.rewarding("dense") if "dense" in modes[1:] else nullcontext():
-        results += both.play([touching_episode(task_id, 2)], "reused")
+        results += compare(*both, [touching_episode(task_id, 1)], history="reused")
     assert complaints(results) == []
     if has_movable_bodies(task_id):
-        assert sum(result.contact_steps for result in results) >= 10, "hardly anything was touched"
+        assert sum(result.contact_steps for result in results) >= 5, "hardly anything was touched"
 
     for seed in SEEDS:
         native, ours = (side.reset([seed], [0], rebuild=False) for side in both)

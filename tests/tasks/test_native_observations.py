@@ -18,6 +18,7 @@ import tasks
 from parity.native import make_native, native_action, native_action_dim, quiet
 from tasks.engine.pictures import as_picture, tiled
 from tests.native import NATIVE, TASKS
+from tests.quick import quick_cases
 
 pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer", "textures_in_order")]
 
@@ -148,7 +149,7 @@ def pick() -> Iterator[Any]:
         yield native
 
 
-@pytest.mark.parametrize("mode", [*STATES, "pointcloud", "sensor_data", "state+none", EVERYTHING])
+@pytest.mark.parametrize("mode", ["state_dict", "pointcloud", EVERYTHING])
 def test_a_mode_observes_what_native_does(pick: Any, mode: str):
     actions, seen = watch(pick, (mode,), steps=1)
     compare("PickCube-v1", mode, actions, seen[mode])
@@ -164,6 +165,7 @@ def test_a_robots_own_camera_is_in_every_mode(pick: Any):
         compare("PickCube-v1", mode, actions, seen[mode], **making)
 
 
+@pytest.mark.long
 def test_normals_and_albedo_are_those_of_natives_default_shaders():
     with native_in("PickCube-v1", "rgb", sensors=SHADERS) as native:
         actions, seen = watch(native, SLOW[-1:], steps=1)
@@ -190,7 +192,10 @@ def test_a_difference_is_noticed(pick: Any):
     assert differences({**cloud, "sensor_data": {}}, {**cloud, "sensor_data": cloud})
 
 
-@pytest.mark.parametrize("task_id", ["PickCube-v1", "StackPyramid-v1"])  # both observe flags
+# Both observe flags.
+@pytest.mark.parametrize(
+    "task_id", quick_cases(["PickCube-v1", "StackPyramid-v1"], ["StackPyramid-v1"])
+)
 def test_a_flattened_state_dict_is_natives_state(task_id: str):
     with native_in(task_id, "state") as native:
         native.reset(seed=SEED, options={"reconfigure": True})
@@ -204,7 +209,9 @@ def test_a_flattened_state_dict_is_natives_state(task_id: str):
     ours.close()
 
 
-@pytest.mark.parametrize("task_id", ["PickCube-v1", "TwoRobotPickCube-v1"])
+@pytest.mark.parametrize(
+    "task_id", quick_cases(["PickCube-v1", "TwoRobotPickCube-v1"], ["TwoRobotPickCube-v1"])
+)
 def test_a_segmentations_numbers_stand_for_what_they_do_in_native(task_id: str):
     with native_in(task_id, "state") as native:
         theirs = {
@@ -223,7 +230,10 @@ def test_a_segmentations_numbers_stand_for_what_they_do_in_native(task_id: str):
 # -- pictures for people ---------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mode", ["state", "rgb", "pointcloud", "sensor_data", "depth+position"])
+SHOWN = ("state", "rgb", "pointcloud", "sensor_data", "depth+position")
+
+
+@pytest.mark.parametrize("mode", quick_cases(SHOWN, ["state", "depth+position"]))
 def test_what_cameras_see_is_shown_as_native_shows_it(pick: Any, mode: str):
     pick.reset(seed=SEED, options={"reconfigure": True})
     set_mode(pick, mode)

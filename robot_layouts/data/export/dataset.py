@@ -200,6 +200,11 @@ class Export(ExportOptions):
             MissingPackageError: If a package that they need is not installed.
             RecordingError: If the folder holds something already.
         """
+        self.check_options()
+        refuse_used(Path(self.out))
+
+    def check_options(self) -> None:
+        """Refuse what cannot be done wherever it is to be written; see `check`."""
         if self.format not in FORMATS:
             raise UnknownNameError("export format", self.format, FORMATS)
         if self.fps is not None and self.fps < 1:
@@ -210,7 +215,6 @@ class Export(ExportOptions):
             self._expect_robomimic()
         self._expect_points()
         self._expect_pictures()
-        refuse_used(Path(self.out))
 
     def _expect_robomimic(self) -> None:
         for what in ("video", "images", "fps"):

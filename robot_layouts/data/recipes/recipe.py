@@ -23,6 +23,7 @@ from robot_layouts.data.playing.environment import versions
 from robot_layouts.data.reading.json_files import FILE_SIZE, TrajectoryError, sized_file
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording, all_files
+from robot_layouts.data.recording.recorder import checked_file_size
 from robot_layouts.data.suite.suite import (
     checked_mapping,
     checked_name,
@@ -163,7 +164,9 @@ def _making(about: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """Return what an entry says besides task, seeds and people, as arguments of `record`."""
     how = {key: _whole(key, about[key]) for key in _MAKING if key in about}
     if "observations" in how:
-        how["observations"] = str(how["observations"]).lower() == "true"  # YAML's words are texts
+        how["observations"] = _flag("observations", how["observations"])
+    if "file_size" in how:
+        how["file_size"] = checked_file_size(how["file_size"])
     if "robots" in how:
         how["robots"] = read_robots(how["robots"], folder)
     if "layout" in how:
@@ -187,16 +190,28 @@ def _export(name: str, given: Any) -> dict[str, Any]:
     options = {key: _whole(key, value) for key, value in about.items()}
     for key in ("video", "images", "depth", "include_failures"):
         if key in options:
-            options[key] = str(options[key]).lower() == "true"
+            options[key] = _flag(key, options[key])
     if "size" in options:
         options["size"] = _size(options["size"])
-    Export("", out=name, **options)
+    Export("", out=name, **options).check_options()
     return options
 
 
 def _whole(name: str, value: Any) -> Any:
     """Return a value of a YAML file, whose numbers are floats, as the whole number that it is."""
-    return int(value) if name in _WHOLE and isinstance(value, float) else value
+    if name not in _WHOLE or not isinstance(value, float):
+        return value
+    if not value.is_integer():
+        raise TaskError(f"{name} is {value:g}; it must be a whole number")
+    return int(value)
+
+
+def _flag(name: str, value: Any) -> bool:
+    """Return a flag of a YAML file, whose words are texts."""
+    words = {"true": True, "false": False}
+    if str(value).lower() not in words:
+        raise TaskError(f"{name} is {shown(value)}; it takes true or false")
+    return words[str(value).lower()]
 
 
 def _size(value: Any) -> tuple[int, int]:

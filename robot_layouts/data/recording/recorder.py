@@ -315,6 +315,17 @@ class _FinishedEpisode(NamedTuple):
     source: Source
 
 
+def checked_file_size(size: Any) -> float:
+    """Return a size at which a further file is begun (MB).
+
+    Raises:
+        TaskError: If it is no such size.
+    """
+    if not isinstance(size, (int, float)) or not 0 < size < math.inf:
+        raise TaskError(f"file_size is {size!r}; it must be MB, more than 0")
+    return size
+
+
 class Recorder:
     """A recording that grows by whole episodes; whatever ends it, the finished ones stay.
 
@@ -372,8 +383,7 @@ class Recorder:
             TaskError: If the size is invalid.
             AssetError: If robot files cannot be found.
         """
-        if not 0 < file_size < math.inf:
-            raise TaskError(f"file_size is {file_size!r}; it must be MB, more than 0")
+        checked_file_size(file_size)
         self.path = Path(path)
         self.json_path = self.path.with_suffix(".json")
         self.parts = self.path.with_suffix(".parts")

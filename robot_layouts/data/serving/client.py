@@ -9,13 +9,14 @@ import gymnasium
 import numpy as np
 
 from robot_layouts.core.importing import optional
-from robot_layouts.data.playing.served.client import pack, unpack
+from robot_layouts.data.playing.served.client import mapping_of, pack
 from robot_layouts.data.serving.world import CALL, ERROR, read_space
 from robots import RobotLayoutsError
 
 SECONDS = 60.0  # for an answer: the first one takes as long as making the world
 MOST_BYTES = 2**28  # of an observation
 TOO_BIG = 1009  # of a websocket's codes
+_SPACES = "action_space", "observation_space"
 
 
 class RemoteTaskError(RobotLayoutsError, RuntimeError):
@@ -54,9 +55,12 @@ class RemoteEnv(gymnasium.Env[Any, Any]):
             raise self._error(error.response.body.decode(errors="replace").strip()) from None
         except (OSError, self._errors.WebSocketException) as error:
             raise self._error(f"cannot be reached: {error}") from None
-        self.about = self._receive()
-        self.action_space = read_space(self.about.pop("action_space"))
-        self.observation_space = read_space(self.about.pop("observation_space"))
+        try:
+            self.about = self._receive("what it serves", *_SPACES)
+            self.action_space, self.observation_space = map(self._space, _SPACES)
+        except RemoteTaskError:
+            self.close()
+            raise
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -74,7 +78,7 @@ class RemoteEnv(gymnasium.Env[Any, Any]):
             RemoteTaskError: If the seed is invalid; nothing has changed then.
         """
         own = int(seed) if isinstance(seed, np.integer) else seed
-        answer = self._ask({CALL: "reset", "seed": own})
+        answer = self._ask({CALL: "reset", "seed": own}, "observation", "info")
         return answer["observation"], answer["info"]
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -91,34 +95,44 @@ class RemoteEnv(gymnasium.Env[Any, Any]):
         """
         parts = isinstance(action, Mapping)
         sent = {n: np.asarray(p) for n, p in action.items()} if parts else np.asarray(action)
-        answer = self._ask({CALL: "step", "action": sent})
-        return (
-            answer["observation"],
-            *(answer[name] for name in ("reward", "terminated", "truncated", "info")),
-        )
+        names = "observation", "reward", "terminated", "truncated", "info"
+        answer = self._ask({CALL: "step", "action": sent}, *names)
+        return (answer["observation"], *(answer[name] for name in names[1:]))
 
     def close(self) -> None:
         """Close the connection; closing twice is allowed."""
         self._socket.close()
 
-    def _ask(self, message: dict[str, Any]) -> dict[str, Any]:
+    def _ask(self, message: dict[str, Any], *names: str) -> dict[str, Any]:
         try:
             self._socket.send(pack(message))
         except self._errors.ConnectionClosed as error:
             raise self._closed(error) from None
-        answer = self._receive()
-        if ERROR in answer:
-            raise RemoteTaskError(answer[ERROR])
-        return answer
+        return self._receive("an answer", *names)
 
-    def _receive(self) -> dict[str, Any]:
+    def _space(self, name: str) -> gymnasium.Space[Any]:
         try:
-            return unpack(self._socket.recv(timeout=self._seconds))
+            return read_space(self.about.pop(name))
+        except (TypeError, ValueError) as error:
+            raise self._error(f"sent no {name.replace('_', ' ')}: {error}") from None
+
+    def _receive(self, what: str, *names: str) -> dict[str, Any]:
+        """Return a mapping that has these names."""
+        try:
+            answer = mapping_of(self._socket.recv(timeout=self._seconds), what)
         except TimeoutError:
             self.close()  # its answer would come as that to another question
             raise self._error(f"sent no answer within {self._seconds:g} s") from None
         except self._errors.ConnectionClosed as error:
             raise self._closed(error) from None
+        except ValueError as error:
+            raise self._error(str(error)) from None
+        if ERROR in answer:
+            raise RemoteTaskError(str(answer[ERROR]))
+        for name in names:
+            if name not in answer:
+                raise self._error(f"sent {what} without {name!r}")
+        return answer
 
     def _closed(self, error: Any) -> RemoteTaskError:
         if error.rcvd_then_sent and error.rcvd.code == TOO_BIG:

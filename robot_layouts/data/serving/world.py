@@ -126,9 +126,18 @@ def _bound(numbers: NDArray[Any]) -> NDArray[Any]:
     return numbers.flat[:1].reshape(()) if same else numbers
 
 
-def read_space(written: Mapping[str, Any]) -> Space[Any]:
-    """Return the space that `written_space` wrote."""
-    if "parts" in written:
-        return Dict({name: read_space(part) for name, part in written["parts"].items()})
-    low, high = (np.broadcast_to(written[name], written["shape"]) for name in ("low", "high"))
-    return Box(low, high, dtype=low.dtype.type)
+def read_space(written: Any) -> Space[Any]:
+    """Return the space that `written_space` wrote.
+
+    Raises:
+        ValueError: If it wrote none like that.
+        TypeError: Likewise.
+    """
+    match written:
+        case {"parts": dict(parts)}:
+            return Dict({name: read_space(part) for name, part in parts.items()})
+        case {"low": np.ndarray() as low, "high": np.ndarray() as high, "shape": list(shape)}:
+            low, high = np.broadcast_to(low, shape), np.broadcast_to(high, shape)
+            return Box(low, high, dtype=low.dtype.type)
+        case _:
+            raise ValueError(f"{shown(written)} is no space")

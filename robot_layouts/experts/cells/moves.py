@@ -25,6 +25,7 @@ Place = Callable[[Scene], Floats]
 MOST_GRIPS = 6
 FREE, BEYOND = 0.08, -0.02  # before a handle, and beyond it so that it is pushed home (m)
 TILTS = tuple(np.radians((0, 20, 35, 50)))  # of grippers that hold cubes, from straight down
+NEAR_BASE, WAITING = 0.4, 0.3  # of a hand that waits, from its base, and over the table (m)
 READY = 0.03  # rad: so near a gripper comes to its place above a body before it goes down
 
 
@@ -147,53 +148,110 @@ def carry(
     )
 
 
+def stand_back(task: TaskEnv, robot: str) -> Waypoint:
+    """Return the waypoint ``wait``, which brings an arm of a ring back towards its base."""
+
+    def back(scene: Scene) -> Floats:
+        base = scene.base(robot)[:2]
+        return np.array([*(base * (1 - NEAR_BASE / np.linalg.norm(base))), WAITING])
+
+    return reaching(task, robot, "wait", back, near=0.1)
+
+
 def lift_together(
     body: str,
     grips: Mapping[str, Grips],
     height: float,
     *,
     legs: int = 4,
+    onward: Sequence[Callable[[Scene], Pose]] = (),
+    turn_of: Sequence[str] = (),
     near: float = 0.04,
     **picking: Any,
 ) -> dict[str, tuple[Waypoint, ...]]:
     """Return the script with which arms take a body and raise it level, step by step together.
+
+    After those of `pick`, the waypoints are ``raise 0`` …, and ``move 0`` … if it goes on.
 
     Args:
         body: What they lift.
         grips: By arm, the gripper's poses to choose from.
         height: How far it is raised (m).
         legs: In how many steps; between them the arms' joints go straight, not the body.
+        onward: Where the body goes then, one pose after the other, each worked out from the scene
+            when the first arm begins with it.
+        turn_of: Waypoints of other arms that come before it goes on.
         near: How near each arm must come to the end of a step before the next (rad).
         picking: Other arguments of `pick`.
     """
     start: list[Pose] = []
+    goals: dict[str, Pose] = {}
 
-    def raised(scene: Scene, robot: str, share: float) -> list[Pose]:
+    def raised(scene: Scene, share: float) -> Pose:
         if not start:  # all of them hold it now
             start.append(scene.body(body))
         position, quaternion = start[0]
-        level = turn("z", yaw_of(quaternion))
-        return [bringing(scene, robot, body, (position + (0.0, 0.0, share * height), level))]
+        return position + (0.0, 0.0, share * height), turn("z", yaw_of(quaternion))
 
-    def before(robot: str, step: int) -> tuple[str, ...]:
-        name = f"raise {step - 1}" if step else f"grasp {body}"
-        return tuple(f"{other}.{name}" for other in grips if other != robot)
+    steps = {f"raise {i}": partial(raised, share=(i + 1) / legs) for i in range(legs)}
+    steps |= {f"move {i}": goal for i, goal in enumerate(onward)}
+    before = dict(zip(steps, [f"grasp {body}", *steps], strict=False))
+
+    def waits(step: str, robot: str) -> tuple[str, ...]:
+        others = (f"{other}.{before[step]}" for other in grips if other != robot)
+        return (*others, *(turn_of if step == "move 0" else ()))
+
+    def brought(scene: Scene, robot: str, step: str) -> list[Pose]:
+        if step not in goals:
+            goals[step] = steps[step](scene)
+        return [bringing(scene, robot, body, goals[step])]
 
     return {
         robot: (
             *pick(robot, body, own, **picking),
             *(
                 Waypoint(
-                    f"raise {i}",
-                    partial(raised, robot=robot, share=(i + 1) / legs),
+                    step,
+                    partial(brought, robot=robot, step=step),
                     CLOSED,
-                    after=before(robot, i),
+                    after=waits(step, robot),
                     near=near,
                 )
-                for i in range(legs)
+                for step in steps
             ),
         )
         for robot, own in grips.items()
+    }
+
+
+def set_down(
+    body: str, arms: Sequence[str], last: str, *, rise: float = 0.1, opening: float = OPEN
+) -> dict[str, tuple[Waypoint, ...]]:
+    """Return the waypoints with which arms let go of a body together: ``release``, ``rise``.
+
+    Args:
+        body: What they hold, where it is to stay.
+        arms: Who holds it.
+        last: The waypoint of all of them that comes before.
+        rise: How far the hands back off then (m).
+        opening: Action number of the grippers then.
+    """
+
+    def rising(scene: Scene, robot: str) -> list[Pose]:
+        return [backed_off(scene.tcp(robot), rise)]
+
+    return {
+        robot: (
+            Waypoint(
+                f"release {body}",
+                None,
+                opening,
+                steps=3,
+                after=tuple(f"{other}.{last}" for other in arms if other != robot),
+            ),
+            Waypoint(f"rise {body}", partial(rising, robot=robot), opening, near=0.1),
+        )
+        for robot in arms
     }
 
 

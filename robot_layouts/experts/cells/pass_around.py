@@ -6,16 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from robot_layouts.experts.cells.moves import carry, cube_holds
+from robot_layouts.experts.cells.moves import carry, cube_holds, stand_back
 from robot_layouts.experts.grasps import YAWS, need_fingers
-from robot_layouts.experts.reaching import reaching
 from robot_layouts.experts.rehearsal import Plan, first_success
 from robot_layouts.experts.script import Scene, Script
 from robot_layouts.kinematics.rotations import Floats
 from tasks import TaskEnv
 from tasks.cells.pass_around import HALF
-
-NEAR_BASE, WAITING = 0.4, 0.3  # of the hand that waits, from its base, and over the table (m)
 
 
 def pass_around(task: TaskEnv, seed: int) -> Plan:
@@ -34,7 +31,7 @@ def _script(task: TaskEnv, height: float) -> Script:
     arms = list(task.layout.arms)
     return {
         arm: (
-            reaching(task, arm, "wait", partial(_back, arm=arm), near=0.1),
+            stand_back(task, arm),
             *carry(
                 task,
                 arm,
@@ -48,12 +45,6 @@ def _script(task: TaskEnv, height: float) -> Script:
         )
         for arm, before in zip(arms, ["", *arms[:-1]], strict=True)
     }
-
-
-def _back(scene: Scene, arm: str) -> Floats:
-    """Return where an arm waits: over the table, nearer to itself than any zone."""
-    base = scene.base(arm)[:2]
-    return np.array([*(base * (1 - NEAR_BASE / np.linalg.norm(base))), WAITING])
 
 
 def _zone(scene: Scene, arm: str) -> Floats:

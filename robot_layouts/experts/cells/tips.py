@@ -20,7 +20,6 @@ PUSHING = (0.0, 0.3, 0.6, -0.3)  # how far grippers lean from straight down (rad
 PRESSING = (0.0, 0.3, -0.3, 0.6)
 UPRIGHT = (0.0, 0.15, -0.15)
 HIGH, OVER = 0.14, 0.06  # of tips on their way over the table, and over what they press (m)
-CONTACT = 0.04  # from a tip's middle to that of a block of 5 cm when they touch, about (m)
 LEAST = 0.012  # m; of a stroke, unless less is left
 PRESSED = 8  # control steps that pressing takes, however far the tip comes
 BEYOND = 0.15  # m behind its end, where a push aims; so it stays steady near the end
@@ -67,8 +66,9 @@ def push(
 
     def along(scene: Scene, left: int) -> Floats:
         target, away = aim(scene)
-        far = float((scene.tcp(robot)[0][:2] - target) @ away)
-        return np.array([*(target + (far + (BEYOND + CONTACT - far) / left) * away), height])
+        tip, block = scene.tcp(robot)[0][:2], scene.body(body)[0][:2]
+        far, rest = float((tip - target) @ away), float((block - target) @ away) - BEYOND
+        return np.array([*(target + (far - max(rest / left, min(LEAST, rest))) * away), height])
 
     def back(scene: Scene, up: float) -> Floats:
         return np.array([*(scene.tcp(robot)[0][:2] + 0.06 * aim(scene)[1]), up])

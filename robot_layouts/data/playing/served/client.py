@@ -131,15 +131,10 @@ class Connection:
             data: Any = self._socket.recv(timeout=self._seconds)
         except TimeoutError:
             raise self._error(f"sent nothing within {self._seconds:g} s, not {what}") from None
-        if isinstance(data, str):
-            raise self._error(f"sent a text, not {what}: {cut(_last_line(data), _SHOWN)}")
         try:
-            message = unpack(data)
+            return mapping_of(data, what)
         except ValueError as error:
-            raise self._error(f"sent what is not {what}: {error}") from None
-        if not isinstance(message, dict):
-            raise self._error(f"sent {shown(message)}, not {what}, which is a mapping")
-        return cast("dict[Any, Any]", message)
+            raise self._error(str(error)) from None
 
     def _reason(self, error: Any) -> str:
         if error.sent is not None and error.sent.code == 1009:
@@ -220,6 +215,27 @@ def unpack(data: bytes) -> Any:
         raise ValueError(f"it is not msgpack: {error}") from None
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+
+
+def mapping_of(data: bytes | str, what: str) -> dict[Any, Any]:
+    """Return the mapping that a server sent.
+
+    Args:
+        data: What it sent.
+        what: What that should be, for the message.
+
+    Raises:
+        ValueError: If it is no mapping; the message goes on from the server's name.
+    """
+    if isinstance(data, str):
+        raise ValueError(f"sent a text, not {what}: {cut(_last_line(data), _SHOWN)}")
+    try:
+        message = unpack(data)
+    except ValueError as error:
+        raise ValueError(f"sent what is not {what}: {error}") from None
+    if not isinstance(message, dict):
+        raise ValueError(f"sent {shown(message)}, not {what}, which is a mapping")
+    return cast("dict[Any, Any]", message)
 
 
 def _encoded(value: Any) -> Any:
