@@ -24,9 +24,9 @@ APART = 1e-4  # rad, m: how far float32 may be from MuJoCo's float64
 # At 1, drives of Pandas are at their limit of force to the last bit, on either side of it.
 SHORT = np.float32(0.99)
 OBSERVED = 2e-3  # of observations, which have speeds in them (rad/s)
+BY_WORD = ("PressInOrder", "SetFaders", "SortByWord", "StackInOrder", "TakeSides", "ThrowLevers")
 REFUSED = {
-    "CellSetFaders-v1": "which instruction",
-    "CellThrowLevers-v1": "which instruction",
+    **{f"Cell{name}-v1": "which instruction" for name in (*BY_WORD, "TurnTaps")},
     "DrawTriangle-v1": "one by one",
     "PegInsertionSide-v1": "geometry changes",
 }
