@@ -159,7 +159,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         self.single_observation_space = host.single_observation_space
         self.observation_space = batch_space(self.single_observation_space, count)
         self._restart(~self._nowhere)
-        self._look(~self._nowhere)
+        self._info(self._look(~self._nowhere))  # a task that cannot be judged here says so
 
     # -- episodes ----------------------------------------------------------------------------
 
