@@ -83,7 +83,6 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         starts: int = STARTS,
         first_seed: int | None = None,
         contacts: int | None = None,
-        deterministic: bool = False,
         **fields: Any,
     ) -> None:
         """Draw the starts, and put the worlds on the device.
@@ -99,8 +98,6 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             starts: How many starts are kept on the device.
             first_seed: Seed of the first of them; None takes the task's.
             contacts: How many contacts each world has room for; None for enough for hands.
-            deterministic: Whether a card gives equal seeds equal bits, which takes it longer; a
-                processor always does.
             fields: Other arguments of `tasks.make`.
 
         Raises:
@@ -127,9 +124,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         self._draw = lambda seeds: Starts.of(map(self._start, seeds), on)
         self.seeds = range(first, first + kept)
         self._starts = self._draw(self.seeds).without_constants(self._world.as_built)
-        self._simulation = DeviceSimulation(
-            host.simulation, self._starts, count, contacts=contacts, deterministic=deterministic
-        )
+        self._simulation = DeviceSimulation(host.simulation, self._starts, count, contacts=contacts)
         self._elapsed = torch.zeros(count, dtype=torch.int32, device=on)
         self.task = task = object.__new__(cls)
         vars(task).update(vars(host.task))
@@ -164,7 +159,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         self.single_observation_space = host.single_observation_space
         self.observation_space = batch_space(self.single_observation_space, count)
         self._restart(~self._nowhere)
-        self._look(~self._nowhere)
+        self._info(self._look(~self._nowhere))  # a task that cannot be judged here says so
 
     # -- episodes ----------------------------------------------------------------------------
 

@@ -24,9 +24,9 @@ APART = 1e-4  # rad, m: how far float32 may be from MuJoCo's float64
 # At 1, drives of Pandas are at their limit of force to the last bit, on either side of it.
 SHORT = np.float32(0.99)
 OBSERVED = 2e-3  # of observations, which have speeds in them (rad/s)
+BY_WORD = ("PressInOrder", "SetFaders", "SortByWord", "StackInOrder", "TakeSides", "ThrowLevers")
 REFUSED = {
-    "CellSetFaders-v1": "which instruction",
-    "CellThrowLevers-v1": "which instruction",
+    **{f"Cell{name}-v1": "which instruction" for name in (*BY_WORD, "TurnTaps")},
     "DrawTriangle-v1": "one by one",
     "PegInsertionSide-v1": "geometry changes",
 }
@@ -271,7 +271,7 @@ def test_every_task_goes_as_in_mujoco_or_is_refused(engine, task):
         plan = SHORT * np.asarray(list(find_expert(task)(host, seed)), np.float32)
         env.reset(seed=[seed, seed])
         host.reset(seed)
-        for action in plan[:10]:
+        for action in plan[:8]:
             obs, *_, info = env.step(np.repeat(action[None], 2, 0))
             seen, *_, told = host.step(action[None])
             joints = torch.from_numpy(host.state.joint_positions)

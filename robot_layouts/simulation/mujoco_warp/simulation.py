@@ -38,7 +38,6 @@ class DeviceSimulation:
         num_envs: int,
         *,
         contacts: int | None = None,
-        deterministic: bool = False,
     ) -> None:
         """Put the first world of a simulation in MuJoCo on the device of its starts.
 
@@ -47,7 +46,6 @@ class DeviceSimulation:
             starts: How episodes begin in it.
             num_envs: How many worlds there are to be.
             contacts: How many contacts there is room for in each; None for enough for hands.
-            deterministic: Whether a card adds in the same order whenever it does the same again.
 
         Raises:
             SimulationError: If the device lacks memory, or MuJoCo Warp something of the model.
@@ -59,9 +57,7 @@ class DeviceSimulation:
         self.control = DeviceControl(host.layout, device)
         self.index = DeviceIndex(host.layout, world.index.built, device)
         self.control.find(self.index)
-        self.bodies = DeviceWorlds(
-            world, starts, num_envs, contacts=contacts, deterministic=deterministic
-        )
+        self.bodies = DeviceWorlds(world, starts, num_envs, contacts=contacts)
         self._steps = host.substeps * world.inner
         self._moment = self._present()
 

@@ -96,7 +96,6 @@ class DeviceWorlds:
         count: int,
         *,
         contacts: int | None = None,
-        deterministic: bool = False,
     ) -> None:
         """Put a world of MuJoCo's on the device that its starts are on, so many times.
 
@@ -105,7 +104,6 @@ class DeviceWorlds:
             starts: How episodes begin there, which says what varies.
             count: How many worlds there are to be.
             contacts: How many contacts there is room for in each; None for enough for hands.
-            deterministic: Whether a card adds in the same order whenever it does the same again.
 
         Raises:
             SimulationError: If the device has not memory enough, or MuJoCo Warp lacks what the
@@ -123,8 +121,6 @@ class DeviceWorlds:
             varied = [name for name in starts.rows if name not in _STATE]
             self._model = mujoco_warp.put_model(model, dict.fromkeys(varied, count))
             self._model.opt.warn_overflow = 0  # it is in `overflowed`
-            if deterministic:
-                self._model.opt.deterministic = int(mujoco_warp.DeterminismType.ALL)
             self._data = mujoco_warp.make_data(model, count, nconmax=room, njmax=rows)
         view = warp.to_torch
         data = self._data
