@@ -1,6 +1,7 @@
 """MuJoCo behind the seam: it begins as SAPIEN does, and moves things as they are declared."""
 
 import dataclasses
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -212,6 +213,18 @@ def test_a_state_that_is_set_goes_on_as_it_did():
         np.testing.assert_allclose(values, dict(leaves(state))[name], atol=1e-6)
     again = [env.step(action)[0] for action in actions[4:]]
     np.testing.assert_allclose(np.array(after), np.array(again), atol=1e-4)
+
+
+def test_a_reset_forgets_what_was_touched():
+    with closing(made("PickCube-v1")) as env:
+        env.reset(seed=0)
+        for action in find_expert("PickCube-v1")(env, 0):
+            *_, info = env.step(action)
+        assert info["is_grasped"][0]
+        _, info = env.reset(seed=1)
+        assert not info["is_grasped"][0]
+        assert not env.state.contact_force("arm", "panda_leftfinger").any()
+        assert not env.simulation.backend.touching()[0]
 
 
 def test_a_reset_leaves_other_worlds_alone():

@@ -102,8 +102,9 @@ class MujocoWorld:
     # -- placing -----------------------------------------------------------------------------
 
     def clear(self) -> None:
-        """Begin a reset: everything rests, and anchored bodies are where they were built."""
+        """Begin a reset: all rests, nothing touches, and what is anchored is where it was built."""
         data = self.data
+        data.ncon = 0
         data.qvel[:] = data.qfrc_applied[:] = data.qacc[:] = data.qacc_warmstart[:] = 0.0
         data.xfrc_applied[:] = 0.0
         for name, body in self.declared.bodies.items():
