@@ -159,7 +159,7 @@ class Scenario:
                 f"'RobotLayouts/…', num_envs=…, simulator={ON_DEVICES!r}, device='cuda:0')"
             )
         for name, choices in (
-            ("simulator", tuple(SIMULATORS)),
+            ("simulator", (*SIMULATORS, ON_DEVICES)),
             ("visuals", VISUALS),
             ("render_mode", (None, *RENDER_MODES)),
             ("bystanders", (None, HOLD, ACT)),

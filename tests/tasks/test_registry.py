@@ -95,7 +95,7 @@ def test_an_unknown_field_raises():
         ({"control_mode": "pd_ee_dance"}, "control_mode 'pd_ee_dance' is not offered"),
         (
             {"simulator": "mujico"},
-            "simulator 'mujico' is not offered; choices: 'sapien3', 'mujoco'",
+            "simulator 'mujico' is not offered; choices: 'sapien3', 'mujoco', 'mujoco_warp'",
         ),
         ({"headless": False}, "headless=False is not offered"),
         ({"cameras": ["base"]}, "cameras has a str; simulation.Camera is needed"),
