@@ -87,12 +87,15 @@ def _moved(placement: Placement, robot: RobotDescriptor, middle: Point, factor: 
     """Return a placement with another robot, as much farther from the middle as a factor says."""
     if placement.keyframe not in robot.keyframes:
         placement = replace(placement, keyframe=None)
-    if robot == placement.robot or placement.on is not None:
+    if robot == placement.robot:
         return placement.with_robot(robot)
-    *flat, z = placement.base_position
-    x, y = (round(m + (at - m) * factor, 4) for m, at in zip(middle, flat, strict=True))
-    turned = faced(robot, placement.facing)
-    moved = replace(placement, robot=robot, position=(x, y, z), quaternion=turned)
+    if placement.on is not None:
+        moved = placement.with_robot(robot)
+    else:
+        *flat, z = placement.base_position
+        x, y = (round(m + (at - m) * factor, 4) for m, at in zip(middle, flat, strict=True))
+        turned = faced(robot, placement.facing)
+        moved = replace(placement, robot=robot, position=(x, y, z), quaternion=turned, rpy=None)
     if not is_known_arm(robot):
         from layouts.ready import grounded
 

@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from layouts import Layout, Placement, at_task, face_to_face, single
+from layouts import Layout, Placement, around_table, at_task, face_to_face, single
 from robots import AssetError, LayoutError, RobotRegistry, UnknownNameError
 from robots.assets.locator import UrdfLocator
 
@@ -67,6 +67,19 @@ def test_a_body_whose_files_are_missing_is_put_by_reach_alone(ready, monkeypatch
     monkeypatch.undo()
     assert alone == replace(ready["robot"], qpos=None)
     assert ready["robot"].start_qpos != alone.start_qpos
+
+
+def test_a_place_may_be_declared_by_angles():
+    turned = Layout({"arm": Placement("panda", (-0.6, 0.2, 0.0), rpy=(0.0, 0.0, -0.3))})
+    at = at_task("ur5", turned)["arm"]
+    np.testing.assert_allclose(at.facing, turned["arm"].facing, atol=1e-9)
+
+
+def test_wheels_stand_on_an_edge_of_a_table_as_well():
+    edges = around_table({"a": "panda", "b": "panda"}, edges=("north", "west"), table=(1.8, 1.7))
+    at = at_task({"b": "fetch"}, edges)["b"]
+    assert at.on == "table.west"
+    assert at.base_position[2] == pytest.approx(0.005, abs=2e-3)
 
 
 def test_what_does_not_fit_is_refused():
