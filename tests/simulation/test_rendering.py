@@ -51,6 +51,18 @@ def test_the_cube_is_seen_where_it_is(drawn):
     assert columns[1] > 312
 
 
+@pytest.mark.parametrize("mode", ["rgb", "state+none"])
+def test_worlds_may_go_while_they_are_drawn(renderer, mode):
+    for task_id in (TASK, "PickCube-v1"):
+        env = tasks.make(task_id, obs_mode=mode)
+        env.reset(7, {"reconfigure": True})
+        env.step(env.action_space.sample())
+        looking = env.observer.cameras, env.observer.mode.textures
+        begun = env.simulation.begin_look(0, *looking, markers=False)
+        env.close()
+        del begun
+
+
 @pytest.mark.long
 def test_another_camera_adds_no_light(drawn):
     drawn.reset(seed=3)

@@ -115,6 +115,7 @@ class Studio:
             for (d, c), casts in zip(LAMPS, (True, False), strict=True)
         ]
         self._cameras: dict[tuple[Any, ...], Any] = {}
+        self._begun = set[Any]()  # cameras that took a picture
         self._markers = _markers(world)
         self._bodies = DrawnBodies(world)
         self._in_software = draws_in_software(world.scene.render_system.device.name)
@@ -135,17 +136,28 @@ class Studio:
             marker.visibility = float(markers)
         placed = [self._placed(name, camera, textures) for name, camera in cameras.items()]
         self._scene.update_render()
+        if not textures:
+            return lambda: [_view(shot, {}) for shot in placed]
         # A graphics card draws everything sooner than backdrops are laid behind what moves.
         layered = self._in_software and all(shot.shaders == LAYERED for shot in placed)
         if markers or not layered or not self._bodies.solid or self._world.shadows:
             return self._whole(placed)
         return self._layered(placed)
 
+    def wait(self) -> None:
+        """Wait until everything that was begun is drawn."""
+        for camera in self._begun:
+            camera.get_picture(COLOR)
+
+    def _take(self, camera: Any) -> None:
+        self._begun.add(camera)
+        camera.take_picture()
+
     def _whole(self, placed: Sequence[_PlacedCamera]) -> Drawn:
         """Begin to take pictures of everything at once."""
         self._bodies.show_all()
         for shot in placed:
-            shot.camera.take_picture()
+            self._take(shot.camera)
         return lambda: [_view(shot, shot.pictures()) for shot in placed]
 
     def _layered(self, placed: Sequence[_PlacedCamera]) -> Drawn:
@@ -157,11 +169,11 @@ class Studio:
         backdrops = self._backdrops_of(standing)
         self._bodies.show_moving([backdrop.planes for backdrop in backdrops.values()])
         for camera in standing:
-            camera.take_picture()
+            self._take(camera)
         for shot in placed:
             if shot.rides:
                 self._bodies.show_seen(planes(shot.camera))
-                shot.camera.take_picture()
+                self._take(shot.camera)
 
         def views() -> list[View]:
             found: list[View] = []
@@ -179,7 +191,7 @@ class Studio:
             backdrop = self._backdrops.get(camera)
             if backdrop is None or not backdrop.fits(camera, poses):
                 self._bodies.show_still()
-                camera.take_picture()
+                self._take(camera)
                 self._backdrops[camera] = Backdrop(camera, poses)
         return {camera: self._backdrops[camera] for camera in cameras}
 

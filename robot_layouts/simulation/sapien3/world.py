@@ -70,6 +70,8 @@ class BuiltWorld:
         shadows: Whether the first light casts shadows in them.
     """
 
+    studio: Any = None  # as long as the world lives, also in a fork
+
     def __init__(
         self,
         layout: Layout,
@@ -120,7 +122,11 @@ class BuiltWorld:
         self.bodies: dict[str, BuiltBody] = {}
         self.built: dict[tuple[Part, str], Any] = {}
         self.looks, self.shadows = AS_DECLARED, False
-        self.studio: Any = None  # as long as this world lives, also in a fork
+
+    def __del__(self) -> None:
+        """Wait for pictures that were begun: a scene that goes before ends the process."""
+        if self.studio is not None:
+            self.studio.wait()
 
     def add(self, body: WorldBody) -> BuiltBody:
         """Build a body, and the parts that its joints move."""
