@@ -54,6 +54,7 @@ CATALOGUE = {
     "CellSwapPlaces-v1": "tasks.cells.swap_places:CellSwapPlaces",
     "CellSweepBlocks-v1": "tasks.cells.sweep_blocks:CellSweepBlocks",
     "CellTakeSides-v1": "tasks.cells.take_sides:CellTakeSides",
+    "CellThreadRings-v1": "tasks.cells.thread_rings:CellThreadRings",
     "CellThrowLevers-v1": "tasks.cells.throw_levers:CellThrowLevers",
     "CellTurnTaps-v1": "tasks.cells.turn_taps:CellTurnTaps",
     "DrawTriangle-v1": "tasks.maniskill.draw_triangle:DrawTriangle",

@@ -51,6 +51,7 @@ CATALOGUE = {
     "CellSwapPlaces-v1": "robot_layouts.experts.cells.swap_places:swap_places",
     "CellSweepBlocks-v1": "robot_layouts.experts.cells.sweep_blocks:sweep_blocks",
     "CellTakeSides-v1": "robot_layouts.experts.cells.take_sides:take_sides",
+    "CellThreadRings-v1": "robot_layouts.experts.cells.thread_rings:thread_rings",
     "CellThrowLevers-v1": "robot_layouts.experts.cells.throw_levers:throw_levers",
     "CellTurnTaps-v1": "robot_layouts.experts.cells.turn_taps:turn_taps",
     "DrawTriangle-v1": "robot_layouts.experts.maniskill.draw_triangle:draw_outline",
