@@ -71,7 +71,7 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
     loaded = load_robots(robots)
     for place in loaded:
         if place not in layout:
-            raise UnknownNameError("place", place, layout)
+            raise UnknownNameError("robot of this layout", place, layout)
     middle = _middle(layout)
     own = [placement.robot for placement in layout.values()]
     after = [loaded.get(place, placement.robot) for place, placement in layout.items()]
