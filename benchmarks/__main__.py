@@ -9,6 +9,7 @@ from benchmarks.device import device
 from benchmarks.engines import engines
 from benchmarks.experts import experts
 from benchmarks.gallery.pages import gallery
+from benchmarks.ladder import ladder
 from benchmarks.learned import imitation, reinforcement
 from benchmarks.manifest import manifest
 from benchmarks.objects import objects
@@ -50,6 +51,7 @@ PROGRAM = Program(
             processors,
             imitation,
             reinforcement,
+            ladder,
             teleop,
             manifest,
         )
