@@ -1,7 +1,7 @@
 """What reading a robot's file came to, cached for the next process.
 
-To load the packages that read URDFs and meshes takes a third of the time in which a process makes its
-first task. So what they read of files in the local copy is kept there as JSON.
+To load the packages that read URDFs and meshes takes a third of the time in which a process makes
+its first task. So what they read of files in the local copy is kept there as JSON.
 """
 
 from __future__ import annotations

@@ -228,33 +228,39 @@ def tensor(**changed: object) -> dict[str, object]:
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
+    "content",
     [
-        (b"", "its header would have 0 bytes"),
-        ((2**40).to_bytes(8, "little") + b"{}", "its header would have 1,099,511,627,776 bytes"),
-        (of_header(b"{"), "it is not json"),
-        (of_header(b"\xff\xff"), "decode"),
-        (of_header(b"[" * 5000), "nests deeper"),
-        (of_header([1]), "the header"),
-        (of_header({"a": tensor(dtype="F64")}), "'F32'"),
-        (of_header({"a": tensor(shape=[3])}), "'a' has other bytes than its shape"),
-        (of_header({"a": tensor(shape=[-2])}), "shape"),
-        (of_header({"a": tensor(data_offsets=[0])}), "a list of 2 values"),
-        (of_header({"a": tensor(), "b": tensor()}), "'b' has other bytes"),
-        (of_header({"a": tensor()}, bytes(4)), "'a' has other bytes"),
-        (
-            of_header({"a": tensor()}, bytes(12)),
-            "12 bytes follow its header, and its tensors have 8",
-        ),
-        (
-            of_header({"a": tensor()}, np.float32([np.nan, 0]).tobytes()),
-            "numbers that are not finite",
-        ),
+        b"",
+        (2**40).to_bytes(8, "little") + b"{}",
+        of_header(b"{"),
+        of_header(b"\xff\xff"),
+        of_header(b"[" * 5000),
+        of_header([1]),
+        of_header({"a": tensor(dtype="F31")}),
+        of_header({"a": tensor(shape=[3])}),
+        of_header({"a": tensor(shape=[-2])}),
+        of_header({"a": tensor(data_offsets=[0])}),
+        of_header({"a": tensor(), "b": tensor()}),
+        of_header({"a": tensor()}, bytes(4)),
+        of_header({"a": tensor()}, bytes(12)),
     ],
 )
-def test_a_file_that_is_no_safetensors_is_refused(tmp_path, content, message):
+def test_a_file_that_is_no_safetensors_is_refused(tmp_path, content):
     (tmp_path / "weights").write_bytes(content)
-    with pytest.raises(UnreadableFileError, match=message):
+    with pytest.raises(UnreadableFileError, match="it is no safetensors file: "):
+        read_tensors(tmp_path / "weights")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        of_header({"a": tensor()}, np.float32([np.nan, 0]).tobytes()),
+        of_header({"a": tensor(dtype="F64", shape=[1])}),
+    ],
+)
+def test_numbers_of_weights_are_finite_and_have_32_bits(tmp_path, content):
+    (tmp_path / "weights").write_bytes(content)
+    with pytest.raises(UnreadableFileError, match="'a' has other numbers than finite ones of 32"):
         read_tensors(tmp_path / "weights")
 
 

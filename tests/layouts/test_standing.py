@@ -88,7 +88,9 @@ def test_what_does_not_fit_is_refused():
         LayoutError, match=r"mobile_panda_dual has 2 limbs \(left, right\), and the task 3"
     ):
         at_task(DUAL, three)
-    with pytest.raises(UnknownNameError, match="unknown robot of this layout 'lef'. Did you mean 'left'"):
+    with pytest.raises(
+        UnknownNameError, match="unknown robot of this layout 'lef'. Did you mean 'left'"
+    ):
         at_task({"lef": "panda"}, TWO)
     with pytest.raises(LayoutError, match="task is 'PickCube-v1'; a task, its class or a Layout"):
         at_task("panda", "PickCube-v1")
