@@ -77,9 +77,13 @@ def test_a_script_as_declared_goes_where_its_numbers_are_in_the_world(small):
     assert world[2] == pytest.approx(0.1 * fit.scale)
 
 
-@pytest.mark.parametrize("cell", WITHOUT_FINGERS)
-def test_small_arms_of_five_joints_solve_cells_that_take_no_fingers(cell: str):
-    env = of(cell, "so101")
+CASES = [*((cell, "so101") for cell in WITHOUT_FINGERS), ("SetFaders", "z1")]
+
+
+@pytest.mark.parametrize(("cell", "robot"), CASES)
+def test_arms_of_other_sizes_solve_cells_that_take_no_fingers(cell: str, robot: str):
+    """Arms of five joints among them, and one that leans where it does not reach upright."""
+    env = of(cell, robot)
     plan = find_expert(env.task_id)(env, 0)
     assert play(env, 0, plan).solved, plan.reason
 
