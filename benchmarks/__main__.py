@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from benchmarks.bench.run import bench, tables
+from benchmarks.cells import cells
 from benchmarks.collisions import collisions
 from benchmarks.conversions import conversions
 from benchmarks.device import device
@@ -38,6 +39,7 @@ PROGRAM = Program(
             soak,
             robots,
             mjcfs,
+            cells,
             collisions,
             planning,
             placing,

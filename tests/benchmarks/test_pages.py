@@ -20,7 +20,8 @@ from objects.registry import CATALOGUE
 from robot_layouts.data.receipts import Receipt
 from robot_layouts.data.receipts.provenance import describe_task
 from robot_layouts.data.suite.results import result_of
-from tasks import get_task_class
+from robots import RobotRegistry
+from tasks import Needs, get_task_class
 
 ROOT = DOCS.parent
 COMMANDS = {
@@ -29,6 +30,7 @@ COMMANDS = {
     "placing": ["placing"],
     "objects": ["objects", "--objects", "mug"],  # which needs no package
     "experts": ["experts", "--tasks"],
+    "cells_robots": ["cells", "--tasks"],
     "engines": ["engines", "--tasks"],
     "conversions": ["conversions", "--modes", "--tasks", "PickCube-v1"],
     "processors": ["processors", "--render"],
@@ -112,6 +114,21 @@ def test_what_the_page_of_experts_promises():
         assert sum(episode["success"] for episode in own) >= 0.98 * len(own), task_id
         assert sum(episode["success"] for episode in elsewhere) >= 0.95 * len(elsewhere), task_id
         assert not any(episode["touching"] for episode in own + elsewhere), task_id
+
+
+def test_what_the_page_of_cells_promises():
+    """All roles that admit a robot are filled with it, in every cell that was tried."""
+    for task_id, of in record("cells_robots")["cells"].items():
+        cls = get_task_class(task_id)
+        for name, seen in of.items():
+            admitted = {
+                role
+                for role in cls.layout
+                if RobotRegistry.load(name).fingers is not None
+                or not cls.needs.get(role, cls.needs.get("*", Needs())).fingers
+            }
+            assert seen["robots"] == dict.fromkeys(sorted(admitted, key=[*cls.layout].index), name)
+            assert seen["episodes"]
 
 
 def test_what_the_page_of_experts_promises_of_pairs():
