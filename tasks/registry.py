@@ -25,10 +25,12 @@ CLONES = "tasks.maniskill."  # where the tasks that clone one of ManiSkill's are
 
 # One line per task, sorted by id: id -> module:class.
 CATALOGUE = {
+    "CellBalanceBall-v1": "tasks.cells.balance_ball:CellBalanceBall",
     "CellBuildBridge-v1": "tasks.cells.build_bridge:CellBuildBridge",
     "CellBuildGate-v1": "tasks.cells.build_gate:CellBuildGate",
     "CellCarryBeam-v1": "tasks.cells.carry_beam:CellCarryBeam",
     "CellCloseDrawers-v1": "tasks.cells.close_drawers:CellCloseDrawers",
+    "CellCrossOver-v1": "tasks.cells.cross_over:CellCrossOver",
     "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",
     "CellHoldAndPush-v1": "tasks.cells.hold_and_push:CellHoldAndPush",
     "CellLiftBoard-v1": "tasks.cells.lift_board:CellLiftBoard",

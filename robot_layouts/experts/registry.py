@@ -22,10 +22,12 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
+    "CellBalanceBall-v1": "robot_layouts.experts.cells.balance_ball:balance_ball",
     "CellBuildBridge-v1": "robot_layouts.experts.cells.build_bridge:build_bridge",
     "CellBuildGate-v1": "robot_layouts.experts.cells.build_gate:build_gate",
     "CellCarryBeam-v1": "robot_layouts.experts.cells.carry_beam:carry_beam",
     "CellCloseDrawers-v1": "robot_layouts.experts.cells.close_drawers:close_drawers",
+    "CellCrossOver-v1": "robot_layouts.experts.cells.cross_over:cross_over",
     "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
     "CellHoldAndPush-v1": "robot_layouts.experts.cells.hold_and_push:hold_and_push",
     "CellLiftBoard-v1": "robot_layouts.experts.cells.lift_board:lift_board",
