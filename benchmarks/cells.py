@@ -89,7 +89,7 @@ def cells(
         out,
         "cells_robots",
         versions=record["versions"],
-        table=table(("cell", *shown), [*rows, _total(record["cells"], shown)]),
+        solved=table(("cell", *shown), [*rows, _total(record["cells"], shown)]),
         mixed=mixed,
         failures=failures,
     )
