@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from benchmarks.bench.run import bench, tables
+from benchmarks.cells import cells
 from benchmarks.collisions import collisions
 from benchmarks.conversions import conversions
 from benchmarks.device import device
 from benchmarks.engines import engines
 from benchmarks.experts import experts
 from benchmarks.gallery.pages import gallery
+from benchmarks.ladder import ladder
 from benchmarks.learned import imitation, reinforcement
 from benchmarks.manifest import manifest
 from benchmarks.objects import objects
@@ -37,6 +39,7 @@ PROGRAM = Program(
             soak,
             robots,
             mjcfs,
+            cells,
             collisions,
             planning,
             placing,
@@ -50,6 +53,7 @@ PROGRAM = Program(
             processors,
             imitation,
             reinforcement,
+            ladder,
             teleop,
             manifest,
         )

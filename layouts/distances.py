@@ -53,9 +53,11 @@ def apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
 def farther(robots: Sequence[RobotDescriptor], own: Sequence[RobotDescriptor]) -> list[float]:
     """Return by which factors robots stand farther from what they do than those they stand in for.
 
-    One that reaches less stands nearer; none stands farther than as all of them reach farther.
+    What those do is in reach of the one of them that reaches least. One that reaches less than that
+    stands nearer; none stands farther than as all of them reach farther.
     """
-    reaches = [robot.reach / other.reach for robot, other in zip(robots, own, strict=True)]
+    least = min(other.reach for other in own)
+    reaches = [robot.reach / least for robot in robots]
     most = max(1.0, min(reaches))
     return [min(reach, most) for reach in reaches]
 

@@ -34,8 +34,9 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
     """Return a task's layout with other robots, each where it reaches what the task's own does.
 
     A robot stands on the line from the task's own to the middle of what is worked on, turned
-    towards it and at the same height: as much nearer as it reaches less, and farther only as far as
-    all robots reach farther. It is raised, if its wheels or feet are lower than its base.
+    towards it and at the same height: as much nearer as it reaches less than that one of the task's
+    own which reaches least, and farther only as far as all robots reach farther. It is raised, if
+    its wheels or feet are lower than its base.
 
     One robot of several limbs serves several places at once: its limbs are called like them, the
     left one serving the first unless they are called so already, and its shoulders are above the
@@ -71,7 +72,7 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
     loaded = load_robots(robots)
     for place in loaded:
         if place not in layout:
-            raise UnknownNameError("place", place, layout)
+            raise UnknownNameError("robot of this layout", place, layout)
     middle = _middle(layout)
     own = [placement.robot for placement in layout.values()]
     after = [loaded.get(place, placement.robot) for place, placement in layout.items()]

@@ -25,15 +25,18 @@ CLONES = "tasks.maniskill."  # where the tasks that clone one of ManiSkill's are
 
 # One line per task, sorted by id: id -> module:class.
 CATALOGUE = {
+    "CellBalanceBall-v1": "tasks.cells.balance_ball:CellBalanceBall",
     "CellBuildBridge-v1": "tasks.cells.build_bridge:CellBuildBridge",
     "CellBuildGate-v1": "tasks.cells.build_gate:CellBuildGate",
     "CellCarryBeam-v1": "tasks.cells.carry_beam:CellCarryBeam",
     "CellCloseDrawers-v1": "tasks.cells.close_drawers:CellCloseDrawers",
+    "CellCrossOver-v1": "tasks.cells.cross_over:CellCrossOver",
     "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",
     "CellHoldAndPush-v1": "tasks.cells.hold_and_push:CellHoldAndPush",
     "CellLiftBoard-v1": "tasks.cells.lift_board:CellLiftBoard",
     "CellLiftPot-v1": "tasks.cells.lift_pot:CellLiftPot",
     "CellLoadTray-v1": "tasks.cells.load_tray:CellLoadTray",
+    "CellMountGears-v1": "tasks.cells.mount_gears:CellMountGears",
     "CellMovePot-v1": "tasks.cells.move_pot:CellMovePot",
     "CellPackTote-v1": "tasks.cells.pack_tote:CellPackTote",
     "CellPassAround-v1": "tasks.cells.pass_around:CellPassAround",
@@ -54,7 +57,6 @@ CATALOGUE = {
     "CellSwapPlaces-v1": "tasks.cells.swap_places:CellSwapPlaces",
     "CellSweepBlocks-v1": "tasks.cells.sweep_blocks:CellSweepBlocks",
     "CellTakeSides-v1": "tasks.cells.take_sides:CellTakeSides",
-    "CellThreadRings-v1": "tasks.cells.thread_rings:CellThreadRings",
     "CellThrowLevers-v1": "tasks.cells.throw_levers:CellThrowLevers",
     "CellTurnTaps-v1": "tasks.cells.turn_taps:CellTurnTaps",
     "DrawTriangle-v1": "tasks.maniskill.draw_triangle:DrawTriangle",

@@ -24,6 +24,7 @@ from robot_layouts.data.playing.executor import (
 from robot_layouts.data.playing.picture_digests import WatchedPictures
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event
 from robot_layouts.data.playing.served.policy import ServedPolicy
+from robot_layouts.data.playing.shared_policy import SharedPolicy
 from robot_layouts.data.playing.together import Cast, cast_of, grouped
 from robot_layouts.data.receipts.pictures import keep, pictures_folder
 from robot_layouts.data.receipts.provenance import describe_job, receipt_of
@@ -140,9 +141,10 @@ def evaluate(
             (A,) or (1, A). It can be pickled, unless ``workers`` is 0; what `copy.deepcopy` does
             not copy, such as a function, is not copied for each episode. Or where one is imported
             from, ``"module:name"``. Or where one is served, ``"ws://host:port"``; see
-            `robot_layouts.data.playing.served.policy.ServedPolicy`. Or ``"expert"``, which makes a
-            plan for each seed and carries it out; where it finds none, the episode is a failure of
-            0 steps, whose reason is given.
+            `robot_layouts.data.playing.served.policy.ServedPolicy`. Or ``"hub:OWNER/NAME"``; see
+            `robot_layouts.data.playing.shared_policy`. Or ``"expert"``, which makes a plan for each
+            seed and carries it out; where it finds none, the episode is a failure of 0 steps, whose
+            reason is given.
         task: Id of the task, or an environment of it, as which every episode is made.
         seeds: Which episodes, each once.
         num_envs: How many episodes each process plays at once, in environments of one task. The
@@ -174,6 +176,7 @@ def evaluate(
         ReceiptError: If it needs files of the policy that cannot be read.
         WorkerError: If the policy raised something, cannot be sent to the workers, or they die of
             it again and again.
+        HubError: If the policy cannot be read from the Hub.
         PolicyServerError: If the policy's server cannot be reached, is silent, or answers what is
             no action.
     """
@@ -229,7 +232,7 @@ def _name(cast: Cast) -> str:
     """Return who plays, in words."""
     if cast.expert is not None:
         return EXPERT
-    if isinstance(cast.policy, ServedPolicy):
+    if isinstance(cast.policy, (ServedPolicy, SharedPolicy)):
         return cast.policy.name
     return getattr(cast.policy, "__qualname__", type(cast.policy).__qualname__)
 

@@ -144,19 +144,20 @@ def grips_to(
     """
     solver = pose_solver(task, robot)
 
-    def reachable(pose: Pose, qpos: Floats) -> bool:
+    def reachable(scene: Scene, pose: Pose) -> bool:
         position, quaternion = pose
         poses = [(position, quaternion), (position + (0.0, 0.0, above), quaternion)]
-        return all(solver.solve(*each, qpos) is not None for each in poses)
+        qpos = scene.qpos(robot)
+        return all(solver.solve(*scene.in_world(each), qpos) is not None for each in poses)
 
     def brings(scene: Scene, grip: Pose) -> bool:
-        qpos, (start, _) = scene.qpos(robot), scene.body(body)
-        if not reachable(grip, qpos):
+        start, _ = scene.body(body)
+        if not reachable(scene, grip):
             return False
         turned = (turn("z", yaw) for yaw in PLACE_YAWS)
         arm, end = grip[0] - start, place(scene)
         return any(
-            reachable((end + rotate(yaw, arm), multiply(yaw, grip[1])), qpos) for yaw in turned
+            reachable(scene, (end + rotate(yaw, arm), multiply(yaw, grip[1]))) for yaw in turned
         )
 
     def grips(scene: Scene) -> list[Pose]:
@@ -187,7 +188,7 @@ def lowerable(
         return [
             (position, quaternion)
             for position, quaternion in poses(scene)
-            if solver.solve(position - below, quaternion, qpos) is not None
+            if solver.solve(*scene.in_world((position - below, quaternion)), qpos) is not None
         ]
 
     return kept
@@ -216,7 +217,7 @@ def in_reach(
     def reaches(scene: Scene, grip: Pose) -> bool:
         qpos = scene.qpos(robot)
         for pose in (backed_off(grip, above), grip, *on(scene, grip)):
-            arm = solver.solve(*pose, qpos)
+            arm = solver.solve(*scene.in_world(pose), qpos)
             if arm is None:
                 return False
             qpos[places] = arm

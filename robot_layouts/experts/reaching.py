@@ -8,6 +8,7 @@ from typing import Any
 
 from robot_layouts.experts.geometry import gripper_facing, heading
 from robot_layouts.experts.script import Pose, Scene, Waypoint
+from robot_layouts.experts.tips import pose_solver
 from robot_layouts.kinematics.rotations import Floats
 from tasks import TaskEnv
 
@@ -22,6 +23,7 @@ def reaching(
     place: Callable[[Scene], Floats],
     *,
     leans: Sequence[float] = LEANS,
+    farther: Sequence[float] = (),
     as_it_is: bool = True,
     **others: Any,
 ) -> Waypoint:
@@ -33,6 +35,7 @@ def reaching(
         name: What the waypoint is called.
         place: Where the TCP should be, (3,) (m, world), given the scene.
         leans: How far the gripper may lean from straight down, away from its base (rad).
+        farther: How far it may lean where the arm reaches the place with none of those (rad).
         as_it_is: Whether it may also stay turned as it is.
         **others: Other fields of `robot_layouts.experts.script.Waypoint`.
     """
@@ -44,6 +47,12 @@ def reaching(
         point = place(scene)
         ahead = heading(scene.base(robot), point)
         own = [(point, scene.tcp(robot)[1])] if as_it_is else []
-        return [*own, *((point, gripper_facing(ahead, lean)) for lean in leans)]
+        usual = [*own, *((point, gripper_facing(ahead, lean)) for lean in leans)]
+        if not farther:
+            return usual
+        solver, qpos = pose_solver(task, robot), scene.qpos(robot)
+        if any(solver.solve(*scene.in_world(pose), qpos) is not None for pose in usual):
+            return usual
+        return [(point, gripper_facing(ahead, lean)) for lean in farther]
 
     return Waypoint(name, to=poses, **others)

@@ -22,15 +22,18 @@ of their own. The actions hold for freshly built worlds, ``reset(seed, {"reconfi
 
 # One line per task, sorted by id: id -> module:function.
 CATALOGUE = {
+    "CellBalanceBall-v1": "robot_layouts.experts.cells.balance_ball:balance_ball",
     "CellBuildBridge-v1": "robot_layouts.experts.cells.build_bridge:build_bridge",
     "CellBuildGate-v1": "robot_layouts.experts.cells.build_gate:build_gate",
     "CellCarryBeam-v1": "robot_layouts.experts.cells.carry_beam:carry_beam",
     "CellCloseDrawers-v1": "robot_layouts.experts.cells.close_drawers:close_drawers",
+    "CellCrossOver-v1": "robot_layouts.experts.cells.cross_over:cross_over",
     "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
     "CellHoldAndPush-v1": "robot_layouts.experts.cells.hold_and_push:hold_and_push",
     "CellLiftBoard-v1": "robot_layouts.experts.cells.lift_board:lift_board",
     "CellLiftPot-v1": "robot_layouts.experts.cells.lift_pot:lift_pot",
     "CellLoadTray-v1": "robot_layouts.experts.cells.load_tray:load_tray",
+    "CellMountGears-v1": "robot_layouts.experts.cells.mount_gears:mount_gears",
     "CellMovePot-v1": "robot_layouts.experts.cells.move_pot:move_pot",
     "CellPackTote-v1": "robot_layouts.experts.cells.pack_tote:pack_tote",
     "CellPassAround-v1": "robot_layouts.experts.cells.pass_around:pass_around",
@@ -51,7 +54,6 @@ CATALOGUE = {
     "CellSwapPlaces-v1": "robot_layouts.experts.cells.swap_places:swap_places",
     "CellSweepBlocks-v1": "robot_layouts.experts.cells.sweep_blocks:sweep_blocks",
     "CellTakeSides-v1": "robot_layouts.experts.cells.take_sides:take_sides",
-    "CellThreadRings-v1": "robot_layouts.experts.cells.thread_rings:thread_rings",
     "CellThrowLevers-v1": "robot_layouts.experts.cells.throw_levers:throw_levers",
     "CellTurnTaps-v1": "robot_layouts.experts.cells.turn_taps:turn_taps",
     "DrawTriangle-v1": "robot_layouts.experts.maniskill.draw_triangle:draw_outline",

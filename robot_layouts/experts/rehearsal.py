@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary, ref
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.experts.framed import framed
 from robot_layouts.experts.player import BlockedError, Player, StuckError
 from robot_layouts.experts.script import Scene, Script
 from robot_layouts.experts.touching import ArmWatch
@@ -198,7 +199,13 @@ def _players(task: TaskEnv, script: Script, scene: Scene, alone: RobotsAlone) ->
     ]
 
 
-def first_success(task: TaskEnv, seed: int, scripts: Callable[[Scene], Iterable[Script]]) -> Plan:
+def first_success(
+    task: TaskEnv,
+    seed: int,
+    scripts: Callable[[Scene], Iterable[Script]],
+    *,
+    as_declared: bool = False,
+) -> Plan:
     """Try scripts one after the other and return the actions of the first that succeeds.
 
     If none does, those in which arms touched, or something blocked one, are tried once more, with
@@ -208,6 +215,9 @@ def first_success(task: TaskEnv, seed: int, scripts: Callable[[Scene], Iterable[
         task: Says layout and physics; left alone.
         seed: The episode.
         scripts: Makes the scripts to try from the episode's first scene, the best first.
+        as_declared: Whether they speak in the frame and the lengths of the task's declaration, as a
+            task that ``fits_robots`` does itself, and not in the world's: scenes are like that, and
+            so are the places that waypoints return.
 
     Returns:
         What `search` returns.
@@ -215,7 +225,10 @@ def first_success(task: TaskEnv, seed: int, scripts: Callable[[Scene], Iterable[
     Raises:
         TaskError: If no script could even be begun.
     """
-    return search(task, seed, lambda copy: tried(copy, seed, scripts(copy.begin(seed))))
+    made = (
+        scripts if not as_declared or task.task.fit.as_declared else framed(scripts, task.task.fit)
+    )
+    return search(task, seed, lambda copy: tried(copy, seed, made(copy.begin(seed))))
 
 
 def tried(

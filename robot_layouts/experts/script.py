@@ -72,6 +72,10 @@ class Scene:
         turned = gripper_turn(self._layout.arm(robot).robot)
         return position, quaternion if turned is None else multiply(quaternion, turned)
 
+    def in_world(self, pose: Pose) -> Pose:
+        """Return a pose of this scene's frame, position and quaternion, in the world (m)."""
+        return pose
+
     def qpos(self, robot: str) -> Floats:
         """Return all joints of a robot in its descriptor's order, shape (dof,) (rad, m)."""
         return self._state.qpos(robot)[0].astype(float)

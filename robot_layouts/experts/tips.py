@@ -1,23 +1,30 @@
 """Inverse kinematics of grippers whose TCP link does not say where they point and how they open.
 
 Poses are of the gripper's frame (`robots.gripper_motion`). The TCP may be the mean of several
-links, such as jaws' tips.
+links, such as jaws' tips, and the arm may have too few joints to turn its gripper in any way.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
+from math import pi, remainder
+
 import numpy as np
 
+from robot_layouts.experts.geometry import heading
 from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate
 from robot_layouts.kinematics.solve import descend_by_differences
 from robot_layouts.simulation.backend import PointSolver, PoseSolver
 from robots import RobotDescriptor
+from robots.descriptor import IDENTITY
 from robots.gripper_motion import gripper_tree, gripper_turn, tips
 from tasks import TaskEnv
 
 _TURN_WORTH = 0.01  # m of error that a turn by 1 rad is worth: place comes first
 _PLACE, _TURN = 0.003, 0.35  # m and rad that may be missing
 _AXES = np.eye(3)[1:]  # how it opens, and its approach
+_JOINTS = 6  # of an arm that can turn its gripper in any way
 
 
 class TipSolver:
@@ -26,15 +33,18 @@ class TipSolver:
     The place is reached, and the gripper is turned as well as can be.
     """
 
-    def __init__(self, robot: RobotDescriptor, reach: PointSolver, turned: Floats) -> None:
+    def __init__(
+        self, robot: RobotDescriptor, reach: PointSolver, turned: Floats, base: Floats
+    ) -> None:
         """Take a robot.
 
         Args:
-            robot: What it is; its TCP is the mean of several links.
+            robot: What it is.
             reach: Its solver for points of its TCP link.
             turned: See `gripper_turn`.
+            base: Where it stands, (3,) (m, world).
         """
-        self._robot, self._reach, self._turn = robot, reach, turned
+        self._robot, self._reach, self._turn, self._base = robot, reach, turned, base
         self._tree = gripper_tree(robot)
         places = [robot.joints.index(joint) for joint in reach.joints]
         self._low, self._high = self._tree.limits[places].T
@@ -51,7 +61,26 @@ class TipSolver:
             quaternion: Of the gripper's frame in the world, wxyz.
             qpos: All joints now, in the descriptor's order, (dof,) (rad, m).
         """
-        tip, arm = tips(self._tree, self._robot, qpos).mean(0), self._reach.arm(qpos)
+        arm, tip = self._reach.arm(qpos), np.array(self._robot.tcp_offset, float)
+        if self._robot.tcp_position_links:
+            tip = tips(self._tree, self._robot, qpos).mean(0)
+        found = (
+            self._near(start, tip, position, quaternion)
+            for start in self._starts(arm, tip, position)
+        )
+        return [*islice((arm for arm in found if arm is not None), 1)]
+
+    def _starts(self, arm: Floats, tip: Floats, position: Floats) -> Iterator[Floats]:
+        """Yield postures to begin from: the arm's, and those turned to a place about its base."""
+        yield arm
+        now = heading(self._base, self._reach.place_of(tip, arm))
+        about = remainder(heading(self._base, position) - now, 2 * pi)
+        for side in (1, -1):
+            yield arm + side * about * (np.arange(len(arm)) == 0)
+
+    def _near(
+        self, start: Floats, tip: Floats, position: Floats, quaternion: Floats
+    ) -> Floats | None:
         axes = [rotate(quaternion, axis) for axis in _AXES]
 
         def errors(joints: Floats) -> Floats:
@@ -63,12 +92,13 @@ class TipSolver:
             ]
             return np.concatenate([away, *(_TURN_WORTH * turn for turn in turns)])
 
-        near = self._reach.solve(tip, position, arm)
-        found = descend_by_differences(errors, arm if near is None else near, range(len(arm)))
+        near = self._reach.solve(tip, position, start)
+        begun = start if near is None else near
+        found = descend_by_differences(errors, begun, range(len(start)))
         found = np.clip(found, self._low, self._high)
         missing = np.abs(errors(found))
         fits = missing[:3].max() < _PLACE and missing[3:].max() < _TURN * _TURN_WORTH
-        return [found] if fits else []
+        return found if fits else None
 
 
 class TurnedSolver:
@@ -94,9 +124,11 @@ def pose_solver(task: TaskEnv, robot: str) -> PoseSolver | TipSolver | TurnedSol
         task: Where it stands.
         robot: Its name in the layout.
     """
-    descriptor = task.layout.arm(robot).robot
-    turned = gripper_turn(descriptor)
-    if turned is None or not descriptor.tcp_position_links:
-        solver = task.simulation.backend.inverse_kinematics(robot)
-        return solver if turned is None else TurnedSolver(solver, turned)
-    return TipSolver(descriptor, task.simulation.backend.point_reach(robot), turned)
+    arm, backend = task.layout.arm(robot), task.simulation.backend
+    descriptor, turned = arm.robot, gripper_turn(arm.robot)
+    few = len(descriptor.arm_joints) < _JOINTS
+    if few or (turned is not None and descriptor.tcp_position_links):
+        base, turn = np.array(arm.base_position), IDENTITY if turned is None else turned
+        return TipSolver(descriptor, backend.point_reach(robot), np.array(turn), base)
+    solver = backend.inverse_kinematics(robot)
+    return solver if turned is None else TurnedSolver(solver, turned)

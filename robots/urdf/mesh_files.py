@@ -17,11 +17,13 @@ from functools import lru_cache
 from typing import Any
 from urllib.parse import unquote
 
+from robot_layouts.core.disk_cache import cached
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import read_regular
 from robots.urdf.paths import is_allowed
 from robots.urdf.text import parse_xml
 
+_METHOD = b"body 1"  # to be raised when the same contents are judged otherwise
 ENDINGS = (".stl", ".obj", ".dae", ".glb", ".gltf", ".ply")
 MAX_MESH_BYTES = 256 << 20
 LARGEST = 1e4  # m; of a coordinate
@@ -209,11 +211,16 @@ def has_body(path: str, scale: Sequence[float], where: str, urdf: str) -> bool:
 def _has_body(
     path: str, identity: tuple[int, ...], scale: tuple[float, ...], where: str, urdf: str
 ) -> bool:
-    try:
-        read_corners(path, scale, where, urdf)
-    except _NoVolumeError:
-        return False
-    return True
+    def read() -> bool:
+        try:
+            read_corners(path, scale, where, urdf)
+        except _NoVolumeError:
+            return False
+        return True
+
+    if posixpath.splitext(path)[1].lower() in _REFERENCES:
+        return read()  # what it refers to counts, too
+    return cached(path, (_METHOD, repr(scale).encode(), _read(path, where)), read)
 
 
 def has_volume(corners: Floats) -> bool:

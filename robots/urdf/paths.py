@@ -80,8 +80,11 @@ def resolve(reference: str, urdf: str, exists: Exists) -> str:
     folder = posixpath.dirname(urdf)
     first = ""
     for path, package in _candidates(reference, urdf, exists):
+        there = exists(path)
+        if first and not there:
+            continue
         if is_allowed(path, folder, exists) or (package and _inside(path, package)):
-            if exists(path):
+            if there:
                 return path
             first = first or path
     if not first:

@@ -9,11 +9,16 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 from xml.etree.ElementTree import Element, SubElement, tostring
 
+import numpy as np
+
+from robot_layouts.core.disk_cache import cached
 from robot_layouts.core.errors import AssetError
 from robot_layouts.kinematics.rotations import Floats, rpy_pose
 from robots.urdf.checks import expect_drivable, expect_readable, sizes_of
@@ -21,7 +26,12 @@ from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel, UrdfShape
 from robots.urdf.summary import parse_urdf, read_urdf
 from robots.urdf.text import numbers_of
 
+_METHOD = b"urdf 1"  # to be raised when something else is read of the same contents
+_MATRICES = ("origin", "tensor")
 UNREAD = ("visual", "collision", "calibration", "safety_controller")  # what it need not read
+
+
+_Part = TypeVar("_Part", UrdfShape, ModelJoint, LinkInertia)
 
 
 def model_of(urdf: Path) -> UrdfModel:
@@ -38,6 +48,8 @@ def model_of(urdf: Path) -> UrdfModel:
 def read_model(xml: bytes, urdf: str) -> UrdfModel:
     """Return the tree that a URDF describes; the same contents are read once in a process.
 
+    Those of a URDF in the local copy are read once altogether; see `robot_layouts.core.disk_cache`.
+
     Args:
         xml: The URDF's contents.
         urdf: Its path, for messages.
@@ -47,6 +59,10 @@ def read_model(xml: bytes, urdf: str) -> UrdfModel:
             repeated or unknown, its joints make no tree or have impossible limits, a link that
             moves has no mass or inertia, or a shape has no size or is of no known kind.
     """
+    return _model(cached(urdf, (_METHOD, urdf.encode(), xml), lambda: asdict(_read(xml, urdf))))
+
+
+def _read(xml: bytes, urdf: str) -> UrdfModel:
     root = parse_urdf(xml, urdf)
     expect_readable(root, urdf)
     robot = _load(root, urdf)
@@ -73,6 +89,33 @@ def read_model(xml: bytes, urdf: str) -> UrdfModel:
     )
     expect_drivable(model.moving, urdf)
     return model
+
+
+def _model(plain: Mapping[str, Any]) -> UrdfModel:
+    """Return the model that was made plain data."""
+    shapes = {
+        kind: {link: tuple(_made(UrdfShape, own)) for link, own in plain[kind].items()}
+        for kind in ("collisions", "visuals")
+    }
+    names, inertias = plain["inertials"], plain["inertials"].values()
+    return UrdfModel(
+        name=plain["name"],
+        links=tuple(plain["links"]),
+        joints=tuple(_made(ModelJoint, plain["joints"])),
+        inertials=dict(zip(names, _made(LinkInertia, inertias), strict=True)),
+        **shapes,
+    )
+
+
+def _made(cls: type[_Part], rows: Iterable[Mapping[str, Any]]) -> list[_Part]:
+    found: list[_Part] = []
+    for row in rows:
+        own = dict(row)
+        for name, value in row.items():
+            if isinstance(value, list):
+                own[name] = np.array(value) if name in _MATRICES else tuple(value)
+        found.append(cls(**own))
+    return found
 
 
 def _load(root: Element, urdf: str) -> Any:

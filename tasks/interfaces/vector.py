@@ -485,9 +485,10 @@ class _Results:
         info: dict[str, Any] = {}
         everywhere = mask.all()
         for key, array in self._entries(prefix):
-            info[key] = array[ids].copy()
+            text = array.dtype.kind == "U"
+            info[key] = array[ids].astype(object if text else array.dtype)
             if not everywhere:
-                info[key][~mask] = np.zeros((), array.dtype)  # of texts, none
+                info[key][~mask] = None if text else np.zeros((), array.dtype)
             info[f"_{key}"] = mask.copy()
         return info
 

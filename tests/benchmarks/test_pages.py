@@ -10,6 +10,7 @@ pytest.importorskip("matplotlib")
 
 from benchmarks.__main__ import main
 from benchmarks.experts import PAIRS, TASKS
+from benchmarks.ladder import FIRST_TEST, OWN
 from benchmarks.objects import NAMES, digest_of, kind_of
 from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
@@ -18,7 +19,9 @@ from objects import ObjectRegistry
 from objects.registry import CATALOGUE
 from robot_layouts.data.receipts import Receipt
 from robot_layouts.data.receipts.provenance import describe_task
-from tasks import get_task_class
+from robot_layouts.data.suite.results import result_of
+from robots import RobotRegistry
+from tasks import Needs, get_task_class
 
 ROOT = DOCS.parent
 COMMANDS = {
@@ -27,11 +30,13 @@ COMMANDS = {
     "placing": ["placing"],
     "objects": ["objects", "--objects", "mug"],  # which needs no package
     "experts": ["experts", "--tasks"],
+    "cells_robots": ["cells", "--tasks"],
     "engines": ["engines", "--tasks"],
     "conversions": ["conversions", "--modes", "--tasks", "PickCube-v1"],
     "processors": ["processors", "--render"],
     "imitation": ["imitation"],
     "reinforcement": ["reinforcement"],
+    "ladder": ["ladder", "--tasks"],
 }
 LEARNED = ("imitation", "reinforcement")
 RECEIPTS = [path for name in LEARNED for path in sorted((DOCS / "receipts" / name).glob("*.json"))]
@@ -111,6 +116,21 @@ def test_what_the_page_of_experts_promises():
         assert not any(episode["touching"] for episode in own + elsewhere), task_id
 
 
+def test_what_the_page_of_cells_promises():
+    """All roles that admit a robot are filled with it, in every cell that was tried."""
+    for task_id, of in record("cells_robots")["cells"].items():
+        cls = get_task_class(task_id)
+        for name, seen in of.items():
+            admitted = {
+                role
+                for role in cls.layout
+                if RobotRegistry.load(name).fingers is not None
+                or not cls.needs.get(role, cls.needs.get("*", Needs())).fingers
+            }
+            assert seen["robots"] == dict.fromkeys(sorted(admitted, key=[*cls.layout].index), name)
+            assert seen["episodes"]
+
+
 def test_what_the_page_of_experts_promises_of_pairs():
     pairs = record("experts")["pairs"]
     assert list(pairs) == [f"{left}, {right}" for left, right in PAIRS]
@@ -118,6 +138,25 @@ def test_what_the_page_of_experts_promises_of_pairs():
         episodes = pairs[f"{hand}, {hand}"]["episodes"].values()
         assert sum(episode["success"] for episode in episodes) >= 8, hand
         assert not any(episode["touching"] for episode in episodes), hand
+
+
+def test_what_the_page_of_the_ladder_promises():
+    seen = record("ladder")["tasks"]
+    assert sum(len(one["arms"]) >= 3 for one in seen.values()) >= 2
+    assert sum(not {"xarm7", "ur10"}.isdisjoint(one["arms"]) for one in seen.values()) >= 2
+    for task, one in seen.items():
+        for name, found in one["layouts"].items():
+            receipt = Receipt.read(DOCS / "receipts" / "ladder" / found["receipt"])
+            result = result_of(receipt.episodes)
+            tested = range(FIRST_TEST, FIRST_TEST + 50)
+            assert [episode.seed for episode in receipt.episodes] == [*tested]
+            assert (found["solved"], found["episodes"]) == (result.successes, result.episodes)
+            assert (found["steps"], found["stage_score"]) == (result.length, result.stage_score)
+            assert {*found["touching"]} <= {*tested}
+            assert bool(receipt.making["randomization"]) == (name != OWN)
+            assert receipt.policy["name"] == "imitate:policy"
+            assert receipt.policy["files"]
+            assert receipt.task == describe_task(get_task_class(task))
 
 
 def test_nothing_portable_differs():

@@ -177,7 +177,7 @@ def test_without_a_token_nothing_is_asked(hub, recording, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["pushes"], "'pushes' is no data set on the Hub; it must be OWNER/NAME"),
+        (["pushes"], "'pushes' is no name on the Hub; it must be OWNER/NAME"),
         ([f"{NAME}@main"], "names a revision"),
         ([NAME, "--licence", "CC BY"], "the licence is 'CC BY'"),
     ],
@@ -197,7 +197,7 @@ def test_a_folder_without_data_is_refused(hub, tmp_path, capsys):
     ("name", "message"),
     [
         (f"hub:{NAME}", "not found (404)|access refused"),
-        ("hub:pushes", "is no data set on the Hub"),
+        ("hub:pushes", "is no name on the Hub"),
         (f"hub:{NAME}@nowhere", "not found (404)|access refused"),
     ],
 )

@@ -293,7 +293,7 @@ def test_what_is_no_action(tmp_path, given, words):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"policy": "exprt"}, "policy is 'exprt'; it must be MODULE:NAME, ws://HOST:PORT, someth"),
+        ({"policy": "exprt"}, "policy is 'exprt'; it must be MODULE:NAME, ws://HOST:PORT, hub:"),
         ({"policy": 5}, "policy is 5; it must be callable, obs → action, or the word 'expert'"),
         ({"policy": Wanders}, r"policy is the class Wanders; give an instance of it, .* Wanders()"),
         ({"policy": "tests.data.policies:stil"}, "has no attribute 'stil'. Did you mean 'stil"),

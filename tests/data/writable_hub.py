@@ -1,6 +1,6 @@
-"""A stand-in for the Hugging Face Hub on the loopback address that takes data sets, too.
+"""A stand-in for the Hugging Face Hub on the loopback address that takes data sets and models.
 
-What it answers is what the client of huggingface_hub asks when a data set is made, pushed and read.
+What it answers is what the client of huggingface_hub asks when one is made, pushed and read.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from urllib.parse import unquote, urlsplit
 from tests.robots.hub_server import Handler, HubServer
 
 TOKEN = "hf_must_never_be_printed"
-LARGE = (".h5", ".hdf5", ".parquet", ".mp4")  # what goes by LFS
+LARGE = (".h5", ".hdf5", ".parquet", ".mp4", ".safetensors")  # what goes by LFS
 
 
 @dataclass
 class Repository:
-    """A data set: its commits, the last of which is main, and its tags."""
+    """A data set or a model: its commits, the last of which is main, and its tags."""
 
     commits: dict[str, dict[str, bytes]] = field(default_factory=dict)
     tags: dict[str, str] = field(default_factory=dict)
@@ -86,9 +86,9 @@ class _WritableHandler(Handler):
             self.send_json({"errors": [], "warnings": []})
         elif path == "/api/repos/create":
             self._create(json.loads(body))
-        elif found := re.fullmatch(r"/datasets/(.+)\.git/info/lfs/objects/batch", path):
+        elif found := re.fullmatch(r"(?:/datasets)?/(.+)\.git/info/lfs/objects/batch", path):
             self._batch(json.loads(body)["objects"])
-        elif found := re.fullmatch(r"/api/datasets/([^/]+/[^/]+)/(\w+)/(.+)", path):
+        elif found := re.fullmatch(r"/api/(?:datasets|models)/([^/]+/[^/]+)/(\w+)/(.+)", path):
             answer = {"preupload": self._modes, "commit": self._commit, "tag": self._tag}[found[2]]
             answer(hub.repositories[found[1]], found[1], body)
         else:
@@ -162,7 +162,8 @@ class _WritableHandler(Handler):
         path = unquote(urlsplit(self.path).path)
         hub.requests.append((method, path))
         fault = hub.fault_for(method, path)
-        found = re.fullmatch(r"(?:/api)?/datasets/([^/]+/[^/]+)/(\w+)(?:/([^/]+))?(?:/(.+))?", path)
+        kind, name = r"(?:(?:/api)?/datasets|/api/models|)", r"([^/]+/[^/]+)"
+        found = re.fullmatch(rf"{kind}/{name}/(\w+)(?:/([^/]+))?(?:/(.+))?", path)
         repository = hub.repositories.get(found[1]) if found else None
         if fault is not None:
             fault(self, b"")

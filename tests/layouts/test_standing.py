@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from layouts import Layout, Placement, around_table, at_task, face_to_face, single
+from layouts import Layout, Placement, around_table, at_task, face_to_face, ring, single
 from robots import AssetError, LayoutError, RobotRegistry, UnknownNameError
 from robots.assets.locator import UrdfLocator
 
@@ -37,6 +37,15 @@ def test_a_shorter_arm_stands_nearer():
     at = Layout({"arm": replace(alone["arm"], position=(-0.615, 0.0, 0.0))})
     x, y, _ = at_task("so100", at)["arm"].base_position
     assert (round(x, 2), y) == (-round(0.72 * RobotRegistry.load("so100").reach, 2), 0.0)
+
+
+def test_what_the_roles_do_is_in_reach_of_the_one_that_reaches_least():
+    """The UR10 of a ring stands no farther from its middle than the Panda that reaches less."""
+    two = ring({"far": "ur10", "near": "panda"}, radius=0.8)
+    placed = at_task(dict.fromkeys(two, "so101"), two)
+    distances = {name: abs(complex(*p.base_position[:2])) for name, p in placed.items()}
+    assert distances["far"] == pytest.approx(distances["near"])
+    assert distances["near"] == pytest.approx(0.8 * 0.48 / 0.855, abs=1e-3)
 
 
 def test_the_arms_of_one_body_serve_the_roles_called_like_them(ready):
@@ -88,7 +97,9 @@ def test_what_does_not_fit_is_refused():
         LayoutError, match=r"mobile_panda_dual has 2 limbs \(left, right\), and the task 3"
     ):
         at_task(DUAL, three)
-    with pytest.raises(UnknownNameError, match="unknown place 'lef'. Did you mean 'left'"):
+    with pytest.raises(
+        UnknownNameError, match="unknown robot of this layout 'lef'. Did you mean 'left'"
+    ):
         at_task({"lef": "panda"}, TWO)
     with pytest.raises(LayoutError, match="task is 'PickCube-v1'; a task, its class or a Layout"):
         at_task("panda", "PickCube-v1")

@@ -105,6 +105,12 @@ class TestCommand:
         assert "arm.panda_joint7" in printed
         assert "0.1 rad per step" in printed
 
+    def test_a_robot_without_one_arm_is_tried_but_for_steering_its_tcp(self, capsys):
+        assert main(["robots", "inspect", "--try", "floating_panda_gripper"]) == 0
+        printed = capsys.readouterr().out
+        assert "grasps and holds a cube" in printed
+        assert "is not steered: floating_panda_gripper: 'pd_ee_delta_pose' moves the" in printed
+
     def test_what_is_wrong_is_its_exit_code(self, tmp_path, capsys, monkeypatch, small):
         monkeypatch.setattr(
             "robot_layouts.simulation.checks.try_command.named_robot", lambda name: folded(small)

@@ -10,6 +10,7 @@ import pytest
 
 import layouts
 import tasks
+from robot_layouts.experts import find_expert
 from tasks import CellTask
 from tasks.cells.press_in_order import order_of
 from tasks.cells.take_sides import SIDES
@@ -109,7 +110,7 @@ def test_the_instruction_says_in_which_order_cubes_are_stacked():
 
 
 def test_a_gear_counts_once_it_is_on_the_seat_of_its_own_shaft():
-    with closing(tasks.make("CellThreadRings-v1")) as env:
+    with closing(tasks.make("CellMountGears-v1")) as env:
         env.reset(seed=0)
         seats = {
             arm: (*env.state.position(f"shaft_{arm}")[0, :2].tolist(), 0.0096)
@@ -120,3 +121,30 @@ def test_a_gear_counts_once_it_is_on_the_seat_of_its_own_shaft():
         beside = tuple(np.add(seats["third"], (0.03, 0.0, 0.0)))
         assert not put(env, **others, gear_third=beside)["success"].item()
         assert put(env, **others, gear_third=seats["third"])["success"].item()
+
+
+def test_cubes_belong_on_the_side_of_the_neighbour():
+    with closing(tasks.make("CellCrossOver-v1")) as env:
+        env.reset(seed=0)
+        marks = {arm: env.state.position(f"mark_{arm}")[0, :2].tolist() for arm in env.layout.arms}
+        across = {f"cube_{arm}": (*mark, 0.02) for arm, mark in marks.items()}
+        own = across | {"cube_southwest": across["cube_southeast"]}
+        own["cube_southeast"] = across["cube_southwest"]
+        assert put(env, **across)["success"].item()
+        info = put(env, **own)
+        assert info["is_one_across"].item()
+        assert not info["are_three_across"].item()
+
+
+def test_a_ball_beside_the_board_is_not_on_it():
+    with closing(tasks.make("CellBalanceBall-v1")) as env:
+        actions = find_expert("CellBalanceBall-v1")(env, 0)
+        env.reset(0, options={"reconfigure": True})
+        solved = [env.step(action[None])[-1]["success"].item() for action in actions]
+        assert solved[-1]
+        x, y, z = env.state.position("board")[0].tolist()
+        found = []
+        for off in (0.0, 0.14):
+            env.simulation.worlds[0].set_pose("ball", (x + off, y, z + 0.03))
+            found.append(env.task.evaluate(env.simulation.read())["is_high"].item())
+        assert found == [True, False]

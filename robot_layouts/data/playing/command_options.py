@@ -58,7 +58,7 @@ def _picture_size(text: str) -> tuple[int, int]:
 
 
 PictureSize = Annotated[tuple[int, int], Word("WxH", _picture_size)]
-Policy = Annotated[str, Word("MODULE:NAME|ws://HOST:PORT")]
+Policy = Annotated[str, Word("MODULE:NAME|ws://HOST:PORT|hub:OWNER/NAME")]
 RecordingPath = Annotated[Path, Word("FILE|hub:OWNER/NAME")]
 ControlMode = Annotated[
     str | dict[str, str],
@@ -103,8 +103,8 @@ class Acting(Observing):
     """Who acts, on what it observes, and what its actions ask for.
 
     Attributes:
-        policy: A policy that can be imported, or where one is served (ws://HOST:PORT#KEYS, KEYS
-            being droid, aloha or a YAML file); by default the task's expert.
+        policy: A policy that can be imported, where one is served (ws://HOST:PORT#KEYS, KEYS
+            being droid, aloha or a YAML file), or one on the Hub; by default the task's expert.
         control_mode: What actions ask for (as the layout says, else pd_joint_delta_pos).
     """
 

@@ -1,4 +1,4 @@
-"""Policies by name: functions of modules, addresses of servers, and the word for an expert."""
+"""Policies by name: of modules, addresses of servers, on the Hub, and the word for an expert."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from robot_layouts.core.importing import imported
 from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.playing.served.client import PolicyClient
 from robot_layouts.data.playing.served.policy import ServedPolicy, is_address
+from robot_layouts.data.playing.shared_policy import SharedPolicy, hub_policy
+from robot_layouts.data.reading.hub import on_hub
 from robots import TaskError
 from tasks import TaskEnv
 
@@ -16,22 +18,27 @@ def find_policy(name: str, what: str = "policy") -> Any:
     """Return what a name stands for.
 
     Args:
-        name: ``MODULE:NAME``, which is imported; ``ws://HOST:PORT``, a `ServedPolicy`; or the word
-            ``"expert"``, which is returned as it is.
+        name: ``MODULE:NAME``, which is imported; ``ws://HOST:PORT``, a `ServedPolicy`;
+            ``hub:OWNER/NAME[@REVISION]``, a `SharedPolicy`; or the word ``"expert"``, which is
+            returned as it is.
         what: What is looked for, in a word that an error uses.
 
     Raises:
-        TaskError: If it cannot be imported, or the address is invalid.
+        TaskError: If it cannot be imported, the address is invalid, or it is no policy.
+        HubError: If it cannot be downloaded.
     """
     if name == EXPERT and what == "policy":
         return name
     if is_address(name):
         return ServedPolicy(name)
+    if on_hub(name):
+        return hub_policy(name)
     module, _, attribute = name.partition(":")
     if not module or not attribute:
         expert = what == "policy"
         others = f", something callable, or the word {EXPERT!r}" if expert else " or callable"
-        raise TaskError(f"{what} is {name!r}; it must be MODULE:NAME, ws://HOST:PORT{others}")
+        known = "MODULE:NAME, ws://HOST:PORT, hub:OWNER/NAME"
+        raise TaskError(f"{what} is {name!r}; it must be {known}{others}")
     return check_policy(imported(name, what, TaskError), what)
 
 
@@ -58,9 +65,10 @@ def playing(policy: Any, task: TaskEnv) -> Any:
     """Return what acts in a task: of a served policy, what asks its server; else the policy.
 
     Raises:
-        TaskError: If what the server is to be sent does not fit the task.
+        TaskError: If what the server is to be sent, or a policy from the Hub, does not fit the
+            task.
     """
-    return policy.playing(task) if isinstance(policy, ServedPolicy) else policy
+    return policy.playing(task) if isinstance(policy, (ServedPolicy, SharedPolicy)) else policy
 
 
 def waits_of(policy: Any) -> tuple[float, ...]:

@@ -30,6 +30,7 @@ from robot_layouts.data.playing.policies import (
 )
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.served.client import PolicyClient
+from robot_layouts.data.playing.shared_policy import SharedPolicy
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.registry import Expert
 from robots import ActionError, TaskError
@@ -409,7 +410,8 @@ def cast_of(policy: Policy | str, task: type[MultiRobotTask]) -> tuple[Cast, str
     name = policy if isinstance(policy, str) else None
     if name == EXPERT:
         return Cast(expert=find_expert(task.task_id)), None
-    return Cast(check_policy(policy if name is None else find_policy(name))), name
+    found = check_policy(policy if name is None else find_policy(name))
+    return Cast(found), found.name if isinstance(found, SharedPolicy) else name
 
 
 class Casting:

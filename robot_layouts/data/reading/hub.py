@@ -1,9 +1,10 @@
-"""Recordings on the Hugging Face Hub: ``hub:OWNER/NAME[@REVISION]`` wherever one is named."""
+"""Recordings and policies on the Hugging Face Hub: ``hub:OWNER/NAME[@REVISION]``."""
 
 from __future__ import annotations
 
 import os
 import re
+from collections.abc import Sequence
 from functools import cache
 from os import PathLike
 from pathlib import Path
@@ -26,11 +27,11 @@ _STATUSES = {
 
 
 class HubError(RobotLayoutsError, OSError):
-    """A data set that cannot be read from the Hugging Face Hub, or pushed to it."""
+    """Something that cannot be read from the Hugging Face Hub, or pushed to it."""
 
 
 def on_hub(path: str | PathLike[str]) -> bool:
-    """Return whether a recording's name is one on the Hub."""
+    """Return whether the name of a recording or a policy is one on the Hub."""
     return os.fspath(path).startswith(PREFIX)
 
 
@@ -43,7 +44,7 @@ def repository_and_revision(name: str) -> tuple[str, str | None]:
     found = _NAME.fullmatch(name.removeprefix(PREFIX))
     if found is None:
         raise HubError(
-            f"{name!r} is no data set on the Hub; it must be OWNER/NAME, and where one is read"
+            f"{name!r} is no name on the Hub; it must be OWNER/NAME, and where something is read"
             " hub:OWNER/NAME or hub:OWNER/NAME@REVISION"
         )
     return found[1], found[2]
@@ -65,6 +66,30 @@ def local_place(path: str | PathLike[str]) -> Path:
 
 @cache
 def _downloaded(name: str, endpoint: str | None) -> Path:
+    folder = _snapshot(name, "dataset", PARTS, endpoint)
+    if not (place := folder / FILE).is_file():
+        raise HubError(
+            f"{name} holds no recording, whose first file is {FILE}; of an export, only tools for"
+            " its format read the episodes"
+        )
+    return place.parent
+
+
+def downloaded_policy(name: str, parts: Sequence[str]) -> Path:
+    """Download files of a policy, and return the folder, which is called after the commit.
+
+    Args:
+        name: ``hub:OWNER/NAME[@REVISION]``.
+        parts: Names of the files.
+
+    Raises:
+        HubError: If it cannot be downloaded.
+    """
+    return _snapshot(name, "model", parts, os.environ.get(ENDPOINT_VARIABLE))
+
+
+def _snapshot(name: str, kind: str, parts: Sequence[str], endpoint: str | None) -> Path:
+    """Download files of a repository into the Hub's own cache, and return their folder there."""
     from huggingface_hub import snapshot_download
 
     repository, revision = repository_and_revision(name)
@@ -72,20 +97,15 @@ def _downloaded(name: str, endpoint: str | None) -> Path:
     try:
         folder = snapshot_download(
             repository,
-            repo_type="dataset",
+            repo_type=kind,
             revision=revision,
             endpoint=endpoint,
-            allow_patterns=list(PARTS),
+            allow_patterns=list(parts),
             tqdm_class=silent_bar(),
         )
     except Exception as error:  # the client lets its HTTP library's errors through
         raise HubError(f"cannot read {name}: {reason(error)}") from None
-    if not (place := Path(folder) / FILE).is_file():
-        raise HubError(
-            f"{name} holds no recording, whose first file is {FILE}; of an export, only tools for"
-            " its format read the episodes"
-        )
-    return place.parent
+    return Path(folder)
 
 
 def reason(error: BaseException) -> str:

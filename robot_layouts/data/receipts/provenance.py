@@ -27,6 +27,7 @@ from robot_layouts.core.schema import FieldError, Finite, Name, Object, check, l
 from robot_layouts.data.actors import EXPERT, POLICY, definition, name_of
 from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore
 from robot_layouts.data.playing.served.policy import ServedPolicy
+from robot_layouts.data.playing.shared_policy import SharedPolicy
 from robot_layouts.data.playing.together import is_batched
 from robot_layouts.data.reading.json_files import sized_file
 from robot_layouts.data.reading.provenance import (
@@ -274,7 +275,8 @@ def describe_policy(policy: Any, name: str | None = None) -> dict[str, Any]:
     the file of that module. In ``also`` is that of the module that defines its class, if that is
     another one; in ``files`` those of the files that it names by its attribute ``file`` or
     ``files``; in ``weights`` one over the tensors of each ``torch.nn.Module`` that it is or has.
-    Of a policy that is ``served``, only the address and the file of keys are known.
+    Of a policy that is ``served``, only the address and the file of keys are known; one from the
+    Hub has files alone, and a name with the commit that they are of.
 
     Args:
         policy: What gives actions.
@@ -286,6 +288,9 @@ def describe_policy(policy: Any, name: str | None = None) -> dict[str, Any]:
     if isinstance(policy, ServedPolicy):
         about = {"kind": POLICY, "name": policy.name, "sha256": None, "served": True}
         return {**about, **_filled(files=_files(policy))}
+    if isinstance(policy, SharedPolicy):
+        about = {"kind": POLICY, "name": policy.name, "importable": True, "sha256": None}
+        return {**about, "files": _files(policy)}
     found = name or _importable_name(policy)
     module, defining = (found or name_of(policy)).partition(":")[0], definition(policy).__module__
     return {

@@ -292,7 +292,8 @@ def record(
             truncated. Or ``"module:name"``, which is imported. As in `evaluate`, a copy
             plays each episode, and the random generators of Python, NumPy and torch start from
             its seed. Or ``"ws://host:port"``, where one is served; see
-            `robot_layouts.data.playing.served.policy.ServedPolicy`.
+            `robot_layouts.data.playing.served.policy.ServedPolicy`. Or ``"hub:OWNER/NAME"``; see
+            `robot_layouts.data.playing.shared_policy`.
         takeover: May act in the place of the policy, at any step: maps the observation to an
             action, or to None, which lets the policy act. The policy is asked at every step. Or
             ``"module:name"``.

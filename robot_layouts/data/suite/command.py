@@ -92,7 +92,7 @@ def report(
     out: Folder | None = None,
     episodes: Count = 3,
     clips: Natural = 0,
-    policy: Sequence[Annotated[str, Word("MODULE:NAME|ws://HOST:PORT")]] = (),
+    policy: Sequence[Annotated[str, Word("MODULE:NAME|ws://HOST:PORT|hub:OWNER/NAME")]] = (),
     task: Tasks = (),
     players: Players,
 ) -> int:

@@ -25,7 +25,10 @@ def build_bridge(task: TaskEnv, seed: int) -> Plan:
     """
     need_fingers(task, "building the bridge", *task.layout.arms)
     return first_success(
-        task, seed, lambda scene: [_script(task, until) for until in ("rise", "retreat")]
+        task,
+        seed,
+        lambda scene: [_script(task, until) for until in ("rise", "retreat")],
+        as_declared=True,
     )
 
 

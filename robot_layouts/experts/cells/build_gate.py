@@ -32,7 +32,10 @@ def build_gate(task: TaskEnv, seed: int) -> Plan:
     """
     need_fingers(task, "building the gate", *PARTS)
     return first_success(
-        task, seed, lambda scene: [_script(task, height) for height in (0.11, 0.09, 0.12)]
+        task,
+        seed,
+        lambda scene: [_script(task, height) for height in (0.11, 0.09, 0.12)],
+        as_declared=True,
     )
 
 

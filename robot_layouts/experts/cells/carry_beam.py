@@ -27,7 +27,9 @@ def carry_beam(task: TaskEnv, seed: int) -> Plan:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "carrying the beam", "north", *LIFTERS)
-    return first_success(task, seed, lambda scene: [_script(task, near) for near in (0.04, 0.02)])
+    return first_success(
+        task, seed, lambda scene: [_script(task, near) for near in (0.04, 0.02)], as_declared=True
+    )
 
 
 def _script(task: TaskEnv, near: float) -> Script:

@@ -23,4 +23,5 @@ def close_drawers(task: TaskEnv, seed: int) -> Plan:
             }
             for height in (0.045, 0.03, 0.055)
         ],
+        as_declared=True,
     )

@@ -39,7 +39,9 @@ STYLES = (Style(), Style(strokes=14), Style(end=0.14, strokes=14), Style(gap=0.1
 
 def gather_blocks(task: TaskEnv, seed: int) -> Plan:
     """Return the actions of all arms, (T, A), that gather the blocks."""
-    return first_success(task, seed, lambda scene: [_script(task, style) for style in STYLES])
+    return first_success(
+        task, seed, lambda scene: [_script(task, style) for style in STYLES], as_declared=True
+    )
 
 
 def _script(task: TaskEnv, style: Style) -> Script:

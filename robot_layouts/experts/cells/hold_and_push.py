@@ -42,4 +42,5 @@ def hold_and_push(task: TaskEnv, seed: int) -> Plan:
             }
             for depth, strokes in ((0.02, 12), (0.04, 16))
         ],
+        as_declared=True,
     )

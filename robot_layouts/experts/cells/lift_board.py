@@ -32,6 +32,7 @@ def lift_board(task: TaskEnv, seed: int) -> Plan:
             lift_together("board", grips, HEIGHT + 0.02, legs=legs, near=near, ready=0.03)
             for legs, near in ((4, 0.04), (8, 0.02))
         ],
+        as_declared=True,
     )
 
 

@@ -41,4 +41,5 @@ def lift_pot(task: TaskEnv, seed: int) -> Plan:
             )
             for legs in (4, 8)
         ],
+        as_declared=True,
     )

@@ -52,4 +52,6 @@ def load_tray(task: TaskEnv, seed: int) -> Plan:
         )
         return {"loader": loading, **lifting}
 
-    return first_success(task, seed, lambda scene: [script(legs) for legs in (LEGS, 2 * LEGS)])
+    return first_success(
+        task, seed, lambda scene: [script(legs) for legs in (LEGS, 2 * LEGS)], as_declared=True
+    )

@@ -26,7 +26,9 @@ def move_pot(task: TaskEnv, seed: int) -> Plan:
         TaskError: If a lifter has no fingers, or an arm cannot reach what it should.
     """
     need_fingers(task, "moving the pot", *HANDLES)
-    return first_success(task, seed, lambda scene: [_script(task, strokes) for strokes in (12, 18)])
+    return first_success(
+        task, seed, lambda scene: [_script(task, strokes) for strokes in (12, 18)], as_declared=True
+    )
 
 
 def _script(task: TaskEnv, strokes: int) -> Script:

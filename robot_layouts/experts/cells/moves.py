@@ -60,18 +60,19 @@ def carriable(
     """
     solver = pose_solver(task, robot)
 
-    def reachable(position: Floats, quaternion: Floats, qpos: Floats) -> bool:
-        places = (position, position + (0.0, 0.0, above))
-        return all(solver.solve(at, quaternion, qpos) is not None for at in places)
+    def reachable(scene: Scene, position: Floats, quaternion: Floats) -> bool:
+        places, qpos = (position, position + (0.0, 0.0, above)), scene.qpos(robot)
+        poses = (scene.in_world((at, quaternion)) for at in places)
+        return all(solver.solve(*pose, qpos) is not None for pose in poses)
 
     def brings(scene: Scene, grip: Pose) -> bool:
-        qpos, (start, _) = scene.qpos(robot), scene.body(body)
-        if not reachable(*grip, qpos):
+        start, _ = scene.body(body)
+        if not reachable(scene, *grip):
             return False
         arm, end = grip[0] - start, place(scene)
         turned = (turn("z", yaw) for yaw in PLACE_YAWS)
         return any(
-            reachable(end + rotate(yaw, arm), multiply(yaw, grip[1]), qpos) for yaw in turned
+            reachable(scene, end + rotate(yaw, arm), multiply(yaw, grip[1])) for yaw in turned
         )
 
     def kept(scene: Scene) -> list[Pose]:

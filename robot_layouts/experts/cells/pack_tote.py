@@ -31,7 +31,10 @@ def pack_tote(task: TaskEnv, seed: int) -> Plan:
     """
     need_fingers(task, "packing the tote", *PARTS)
     return first_success(
-        task, seed, lambda scene: [_script(task, until) for until in ("rise", "retreat")]
+        task,
+        seed,
+        lambda scene: [_script(task, until) for until in ("rise", "retreat")],
+        as_declared=True,
     )
 
 

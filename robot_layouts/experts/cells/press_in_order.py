@@ -36,5 +36,8 @@ def press_in_order(task: TaskEnv, seed: int) -> Plan:
         }
 
     return first_success(
-        task, seed, lambda scene: [script(depth) for depth in (0.012, 0.02, 0.035)]
+        task,
+        seed,
+        lambda scene: [script(depth) for depth in (0.012, 0.02, 0.035)],
+        as_declared=True,
     )

@@ -19,7 +19,10 @@ OVER = 0.05  # of the tips, before all press (m)
 def press_together(task: TaskEnv, seed: int) -> Plan:
     """Return the actions of all arms, (T, A), that press the buttons at once."""
     return first_success(
-        task, seed, lambda scene: [_script(task, depth) for depth in (0.015, 0.03, 0.05)]
+        task,
+        seed,
+        lambda scene: [_script(task, depth) for depth in (0.015, 0.03, 0.05)],
+        as_declared=True,
     )
 
 

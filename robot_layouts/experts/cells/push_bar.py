@@ -55,4 +55,5 @@ def push_bar(task: TaskEnv, seed: int) -> Plan:
             }
             for strokes in (12, 18)
         ],
+        as_declared=True,
     )

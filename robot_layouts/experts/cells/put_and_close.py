@@ -44,4 +44,5 @@ def put_and_close(task: TaskEnv, seed: int) -> Plan:
             }
             for height in (0.05, 0.035)
         ],
+        as_declared=True,
     )

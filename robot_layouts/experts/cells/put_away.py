@@ -62,4 +62,4 @@ def put_away(task: TaskEnv, seed: int) -> Plan:
             around=0.01,
         ),
     }
-    return first_success(task, seed, lambda scene: [script])
+    return first_success(task, seed, lambda scene: [script], as_declared=True)

@@ -21,7 +21,10 @@ CAP, TOP, SLID = (-0.19, 0.0, 0.069), (0.0, 0.0, 0.052), 0.14  # m
 def run_plant(task: TaskEnv, seed: int) -> Plan:
     """Return the actions of all arms, (T, A), that switch all controls on."""
     return first_success(
-        task, seed, lambda scene: [_script(task, depth) for depth in (0.02, 0.03, 0.045)]
+        task,
+        seed,
+        lambda scene: [_script(task, depth) for depth in (0.02, 0.03, 0.045)],
+        as_declared=True,
     )
 
 

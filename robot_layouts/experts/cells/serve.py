@@ -23,7 +23,9 @@ def serve(task: TaskEnv, seed: int) -> Plan:
         TaskError: If an arm that carries has no fingers, or cannot reach what it should.
     """
     need_fingers(task, "serving the can", "waiter", "server")
-    return first_success(task, seed, lambda scene: [_script(task, lean) for lean in (0.1, 0.6)])
+    return first_success(
+        task, seed, lambda scene: [_script(task, lean) for lean in (0.1, 0.6)], as_declared=True
+    )
 
 
 def _script(task: TaskEnv, lean: float) -> Script:

@@ -47,4 +47,6 @@ def set_faders(task: TaskEnv, seed: int) -> Plan:
             for arm in wanted
         }
 
-    return first_success(task, seed, lambda scene: [script(strokes) for strokes in (14, 20)])
+    return first_success(
+        task, seed, lambda scene: [script(strokes) for strokes in (14, 20)], as_declared=True
+    )

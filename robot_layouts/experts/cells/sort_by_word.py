@@ -26,7 +26,10 @@ def sort_by_word(task: TaskEnv, seed: int) -> Plan:
     need_fingers(task, "sorting cubes", *task.layout.arms)
     choice = CHOICES[seed % len(CHOICES)]
     return first_success(
-        task, seed, lambda scene: [_script(task, choice, until) for until in ("rise", "retreat")]
+        task,
+        seed,
+        lambda scene: [_script(task, choice, until) for until in ("rise", "retreat")],
+        as_declared=True,
     )
 
 

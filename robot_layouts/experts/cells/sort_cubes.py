@@ -26,7 +26,10 @@ def sort_cubes(task: TaskEnv, seed: int) -> Plan:
     """
     need_fingers(task, "sorting cubes", *SIDES)
     return first_success(
-        task, seed, lambda scene: [_script(task, patient) for patient in (False, True)]
+        task,
+        seed,
+        lambda scene: [_script(task, patient) for patient in (False, True)],
+        as_declared=True,
     )
 
 

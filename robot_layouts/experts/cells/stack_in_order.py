@@ -24,7 +24,10 @@ def stack_in_order(task: TaskEnv, seed: int) -> Plan:
     order = ORDERS[seed % len(ORDERS)]
     need_fingers(task, "building the tower", *order)
     return first_success(
-        task, seed, lambda scene: [_script(task, order, until) for until in ("rise", "retreat")]
+        task,
+        seed,
+        lambda scene: [_script(task, order, until) for until in ("rise", "retreat")],
+        as_declared=True,
     )
 
 

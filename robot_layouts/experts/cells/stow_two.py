@@ -34,7 +34,10 @@ def stow_two(task: TaskEnv, seed: int) -> Plan:
     """
     need_fingers(task, "stowing cubes", "opener", *PACKERS)
     return first_success(
-        task, seed, lambda scene: [_script(task, until) for until in ("rise", "retreat")]
+        task,
+        seed,
+        lambda scene: [_script(task, until) for until in ("rise", "retreat")],
+        as_declared=True,
     )
 
 

@@ -21,7 +21,10 @@ def swap_places(task: TaskEnv, seed: int) -> Plan:
     """
     need_fingers(task, "swapping cubes", *task.layout.arms)
     return first_success(
-        task, seed, lambda scene: [_script(task, scene, height) for height in (0.1, 0.08, 0.14)]
+        task,
+        seed,
+        lambda scene: [_script(task, scene, height) for height in (0.1, 0.08, 0.14)],
+        as_declared=True,
     )
 
 

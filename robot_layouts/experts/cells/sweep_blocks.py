@@ -27,7 +27,9 @@ def sweep_blocks(task: TaskEnv, seed: int) -> Plan:
         TaskError: If a sweeper has no fingers, or an arm cannot reach what it should.
     """
     need_fingers(task, "sweeping", *SWEEPERS)
-    return first_success(task, seed, lambda scene: [_script(task, count) for count in (8, 14)])
+    return first_success(
+        task, seed, lambda scene: [_script(task, count) for count in (8, 14)], as_declared=True
+    )
 
 
 def _script(task: TaskEnv, count: int) -> Script:

@@ -32,4 +32,6 @@ def take_sides(task: TaskEnv, seed: int) -> Plan:
             for arm, side in zip(task.layout.arms, sides, strict=True)
         }
 
-    return first_success(task, seed, lambda scene: [script(12, 0.1), script(18, 0.09)])
+    return first_success(
+        task, seed, lambda scene: [script(12, 0.1), script(18, 0.09)], as_declared=True
+    )

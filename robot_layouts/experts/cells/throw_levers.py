@@ -33,4 +33,6 @@ def throw_levers(task: TaskEnv, seed: int) -> Plan:
             for arm in PAIRS[seed % len(PAIRS)]
         }
 
-    return first_success(task, seed, lambda scene: [script(end) for end in (0.12, 0.1)])
+    return first_success(
+        task, seed, lambda scene: [script(end) for end in (0.12, 0.1)], as_declared=True
+    )

@@ -18,7 +18,7 @@ Place = Callable[[Scene], Floats]
 
 PUSHING = (0.0, 0.3, 0.6, -0.3)  # how far grippers lean from straight down (rad)
 PRESSING = (0.0, 0.3, -0.3, 0.6)
-UPRIGHT = (0.0, 0.15, -0.15)
+UPRIGHT, SLANTED = (0.0, 0.15, -0.15), (0.3, 0.6, 0.9, 1.2)  # these where those are out of reach
 HIGH, OVER = 0.14, 0.06  # of tips on their way over the table, and over what they press (m)
 LEAST = 0.012  # m; of a stroke, unless less is left
 PRESSED = 8  # control steps that pressing takes, however far the tip comes
@@ -112,7 +112,8 @@ def advance(
         back: How far the tip goes back in the end (m).
         beside: Other arms that push the same in step.
     """
-    go = partial(reaching, task, robot, leans=UPRIGHT, as_it_is=False, gripper=CLOSED)
+    lean = {"leans": UPRIGHT, "farther": SLANTED}
+    go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
     line: list[Floats] = []  # where it begins, and which way it goes
 
     def at(scene: Scene, up: float) -> Floats:
@@ -161,7 +162,8 @@ def sweep(
         count: In how many parts.
         after: Waypoints of other arms that come before.
     """
-    go = partial(reaching, task, robot, leans=UPRIGHT, as_it_is=False, gripper=CLOSED)
+    lean = {"leans": UPRIGHT, "farther": SLANTED}
+    go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
 
     def above(scene: Scene) -> Floats:
         return path(scene, 0.0) + np.array([0.0, 0.0, HIGH])

@@ -39,4 +39,6 @@ def turn_taps(task: TaskEnv, seed: int) -> Plan:
             for arm in wanted
         }
 
-    return first_success(task, seed, lambda scene: [script(count) for count in (14, 20)])
+    return first_success(
+        task, seed, lambda scene: [script(count) for count in (14, 20)], as_declared=True
+    )

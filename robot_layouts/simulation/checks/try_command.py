@@ -77,12 +77,16 @@ def inspect(
 def _try(robot: RobotDescriptor, console: Console) -> tuple[str, ...]:
     """Try a robot, print what was seen, and return what is wrong."""
     trial, grasps = try_robot(robot, STEPS), tuple(try_grasps(robot))
-    steers = robot.arm_joints and not trial.problems
-    tcps = tuple(try_tcp_control(robot)) if steers else ()
+    tcps, refused = list[TcpTrial](), list[str]()
+    if robot.arm_joints and not trial.problems:
+        try:
+            tcps += try_tcp_control(robot)
+        except DescriptorError as error:
+            refused.append(f"TCP             is not steered: {error}")
     more = [one.problem for one in (*grasps, *tcps) if one.problem is not None]
     problems = (*trial.problems, *more)
     console.print(f"{trial.robot.name}: {trial.robot.summary}")
-    for line in (*_lines(trial), *map(_grasp, grasps), *map(_tcp_control, tcps)):
+    for line in (*_lines(trial), *map(_grasp, grasps), *map(_tcp_control, tcps), *refused):
         console.print(f"  {line}")
     console.print(_numbers(trial))
     if not problems:

@@ -1,4 +1,4 @@
-"""CellThreadRings: all arms take their gears, come over their shafts, and let go on them."""
+"""CellMountGears: all arms take their gears, come over their shafts, and let go on them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robot_layouts.experts.rehearsal import Plan, first_success
 from robot_layouts.experts.script import CLOSED, Pose, Scene, Script, Waypoint
 from robot_layouts.kinematics.rotations import Floats
 from tasks import TaskEnv
-from tasks.cells.thread_rings import CellThreadRings
+from tasks.cells.mount_gears import CellMountGears
 
 HUB = 0.02  # m; how high on a gear its hub is held
 BELOW = 0.015  # m; how far below the tip of its shaft a gear is let go
@@ -23,24 +23,27 @@ HEIGHTS = (0.06, 0.03, 0.023, 0.015, 0.007, 0.0)  # of a gear over that, one aft
 EXACT = 0.0015  # rad; so near an arm comes to its place over the shaft
 
 
-def thread_rings(task: TaskEnv, seed: int) -> Plan:
+def mount_gears(task: TaskEnv, seed: int) -> Plan:
     """Return the actions of all arms, (T, A), that put the gears on their shafts.
 
     Raises:
         TaskError: If an arm has no fingers, or cannot reach what it should.
     """
-    need_fingers(task, "threading gears", *task.layout.arms)
+    need_fingers(task, "mounting gears", *task.layout.arms)
     return first_success(
-        task, seed, lambda scene: [_script(task, 0.01, [0.0]), _script(task, 0.004, YAWS)]
+        task,
+        seed,
+        lambda scene: [_script(task, 0.01, [0.0]), _script(task, 0.004, YAWS)],
+        as_declared=True,
     )
 
 
 def _script(task: TaskEnv, around: float, turns: Sequence[float]) -> Script:
     """Return a script by how near a grip fingers close (rad), and how gears may turn (rad)."""
-    return {arm: _threading(task, arm, around, turns) for arm in task.layout.arms}
+    return {arm: _mounting(task, arm, around, turns) for arm in task.layout.arms}
 
 
-def _threading(task: TaskEnv, arm: str, around: float, turns: Sequence[float]) -> list[Waypoint]:
+def _mounting(task: TaskEnv, arm: str, around: float, turns: Sequence[float]) -> list[Waypoint]:
     gear = f"gear_{arm}"
     place = partial(_upon, arm=arm)
     steps = carry(
@@ -75,5 +78,5 @@ def _grips(scene: Scene, gear: str) -> list[Pose]:
 
 
 def _upon(scene: Scene, arm: str) -> Floats:
-    tip = np.array(CellThreadRings.shaft_first.descriptor.points["tip"].position)
+    tip = np.array(CellMountGears.shaft_first.descriptor.points["tip"].position)
     return scene.body(f"shaft_{arm}")[0] + tip - (0.0, 0.0, BELOW)

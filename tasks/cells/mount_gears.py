@@ -1,4 +1,4 @@
-"""CellThreadRings: three arms put their gears on the shafts between them and their neighbours."""
+"""CellMountGears: three arms put their gears on the shafts between them and their neighbours."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ OUT, OFF, TURN = 0.2, 0.02, 0.3  # of the shafts from the middle, at random (m),
 ON = 0.01  # of a gear from its seat (m)
 
 
-@register_task("CellThreadRings-v1")
-class CellThreadRings(CellTask):
+@register_task("CellMountGears-v1")
+class CellMountGears(CellTask):
     """Put each gear on the shaft to the right of its arm.
 
     Each gear lies 28 to 36 cm from the middle before its arm, up to 8 cm aside, turned at random;
@@ -34,7 +34,7 @@ class CellThreadRings(CellTask):
     source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Put every gear on the shaft to the right of its arm.",
-        "Thread the three gears on the three shafts, each arm to its right.",
+        "Mount the three gears on the three shafts, each arm to its right.",
         "Each take your gear and slide it down the shaft at your right.",
     )
     layout = ring(

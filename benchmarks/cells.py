@@ -1,0 +1,188 @@
+"""``python -m benchmarks cells``: what the experts of cells solve with other robots than their own.
+
+All roles that admit a robot are filled with it; those that need fingers keep their own robot where
+it has none. Some cells are played by mixtures as well.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import closing
+from itertools import product
+from pathlib import Path
+
+import torch
+from tqdm import tqdm
+
+from benchmarks.records import (
+    DOCS,
+    Record,
+    read_record,
+    table,
+    versions_of,
+    write_page,
+    write_record,
+)
+from robot_layouts.experts import find_expert
+from robots import RobotLayoutsError, RobotRegistry
+from tasks import Needs, get_task_class, list_tasks, make
+from tasks.episode import play
+
+ROBOTS = ("so101", "xarm7", "z1", "fetch", "ur10")
+MIXED = (
+    ("CellPressTogether-v1", ("ur10", "panda", "xarm7")),
+    ("CellGatherBlocks-v1", ("ur10", "panda_stick", "panda", "xarm7")),
+    ("CellPutAndClose-v1", ("panda_wristcam", "ur10")),
+    ("CellPutAndClose-v1", ("fetch", "xarm7")),
+    ("CellLiftBoard-v1", ("franka_panda", "panda_wristcam", "panda", "panda_wristcam")),
+    ("CellLiftPot-v1", ("panda_wristcam", "franka_panda")),
+    ("CellLiftPot-v1", ("fetch", "panda_wristcam")),
+    ("CellPutAway-v1", ("franka_panda", "panda_wristcam")),
+    ("CellSortCubes-v1", ("fetch", "panda_wristcam", "panda")),
+    ("CellBuildBridge-v1", ("panda", "panda_wristcam", "fetch")),
+)
+
+
+def cells(
+    *,
+    robots: tuple[str, ...] = ROBOTS,
+    tasks: tuple[str, ...] | None = None,
+    seeds: int = 3,
+    out: Path = DOCS / "cells_robots.json",
+) -> int:
+    """Let experts of cells play with other robots in all roles that admit them, and with mixtures.
+
+    Args:
+        robots: Of what makes, by their names in the catalogue; none leaves mixtures.
+        tasks: Which cells; all of those that fit their robots if not given.
+        seeds: How many episodes of each; those in the record are not played again.
+        out: The record, written after every episode; the page is beside it.
+
+    Raises:
+        RobotLayoutsError: If something cannot be read or written.
+    """
+    torch.set_num_threads(1)
+    record = read_record(out, versions={}, cells={}, mixed={})
+    chosen = _of_the_library() if tasks is None else tasks
+    for task, label, named, kept in tqdm([*_cases(chosen, robots)], disable=None):
+        seen = (
+            record[kept].setdefault(task, {}).setdefault(label, {"robots": named, "episodes": {}})
+        )
+        for _ in _played(task, seen, seeds):
+            record["versions"] |= versions_of("sapien", "ompl", "python-fcl")
+            write_record(out, record)
+    shown = [*dict.fromkeys(robot for of in record["cells"].values() for robot in of)]
+    rows = [_row(task, of, shown) for task, of in sorted(record["cells"].items())]
+    mixed = [
+        (task, label, _of(seen))
+        for task, of in sorted(record["mixed"].items())
+        for label, seen in of.items()
+    ]
+    failures = [
+        line
+        for kept in ("cells", "mixed")
+        for task, of in sorted(record[kept].items())
+        for line in _failures(task, of)
+    ]
+    write_page(
+        out,
+        "cells_robots",
+        versions=record["versions"],
+        solved=table(("cell", *shown), [*rows, _total(record["cells"], shown)]),
+        mixed=mixed,
+        failures=failures,
+    )
+    return 0
+
+
+def _of_the_library() -> list[str]:
+    """Return the cells that fit their robots, but for those that a program has added."""
+    every = {task: get_task_class(task) for task in list_tasks()}
+    return [
+        name
+        for name, cls in every.items()
+        if cls.fits() and cls.__module__.startswith("tasks.cells")
+    ]
+
+
+def _cases(
+    tasks: Sequence[str], robots: Sequence[str]
+) -> Iterator[tuple[str, str, dict[str, str], str]]:
+    """Yield what is played: the task, what its robots are called together, which, and the table."""
+    for robot, task in product(robots, tasks):
+        if roles := _roles(task, robot):
+            yield task, robot, dict.fromkeys(roles, robot), "cells"
+    for task, named in MIXED:
+        if task in tasks:
+            yield (
+                task,
+                ", ".join(named),
+                dict(zip(get_task_class(task).layout, named, strict=True)),
+                "mixed",
+            )
+
+
+def _roles(task: str, robot: str) -> list[str]:
+    """Return the places of a task that a robot can fill."""
+    cls, fingers = get_task_class(task), RobotRegistry.load(robot).fingers is not None
+    anyone = cls.needs.get("*", Needs())
+    return [role for role in cls.layout if fingers or not cls.needs.get(role, anyone).fingers]
+
+
+def _played(task: str, seen: Record, seeds: int) -> Iterator[None]:
+    """Play the seeds that are missing, and yield after each of them."""
+    missing = [str(seed) for seed in range(seeds) if str(seed) not in seen["episodes"]]
+    if not missing:
+        return
+    try:
+        env = make(task, robots=seen["robots"], obs_mode="none")
+    except RobotLayoutsError as error:
+        seen["episodes"] |= dict.fromkeys(missing, _first_line(error))
+        yield
+        return
+    with closing(env):
+        seen["scale"] = round(env.task.fit.scale, 2)
+        for seed in missing:
+            try:
+                plan = find_expert(task)(env, int(seed))
+                solved = play(env, int(seed), plan).solved
+                seen["episodes"][seed] = (
+                    "" if solved else getattr(plan, "reason", "") or "not solved"
+                )
+            except RobotLayoutsError as error:
+                seen["episodes"][seed] = _first_line(error).removeprefix("no plan: ")
+            yield
+
+
+def _first_line(error: RobotLayoutsError) -> str:
+    return str(error).partition("\n")[0].rstrip(":")
+
+
+def _row(task: str, of: Mapping[str, Record], robots: Sequence[str]) -> Iterator[str]:
+    yield task
+    for robot in robots:
+        yield _of(of[robot]) if robot in of else "–"
+
+
+def _of(seen: Record) -> str:
+    reasons = seen["episodes"].values()
+    return f"{_solved(reasons)} of {len(reasons)}"
+
+
+def _total(record: Mapping[str, Mapping[str, Record]], robots: Sequence[str]) -> Iterator[str]:
+    yield "all"
+    for robot in robots:
+        tried = [of[robot]["episodes"].values() for of in record.values() if robot in of]
+        solved = sum(_solved(reasons) for reasons in tried)
+        yield f"{solved} of {sum(map(len, tried))}"
+
+
+def _solved(reasons: Collection[str]) -> int:
+    return sum(not reason for reason in reasons)
+
+
+def _failures(task: str, of: Mapping[str, Record]) -> Iterator[str]:
+    for robot, seen in of.items():
+        reasons = Counter(reason for reason in seen["episodes"].values() if reason)
+        yield from (f"{task}, {robot}: {count} × {reason}" for reason, count in reasons.items())
