@@ -33,6 +33,7 @@ CATALOGUE = {
     "CellCrossOver-v1": "tasks.cells.cross_over:CellCrossOver",
     "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",
     "CellHoldAndPush-v1": "tasks.cells.hold_and_push:CellHoldAndPush",
+    "CellRakeAndPlace-v1": "tasks.cells.rake_and_place:CellRakeAndPlace",
     "CellLiftBoard-v1": "tasks.cells.lift_board:CellLiftBoard",
     "CellLiftPot-v1": "tasks.cells.lift_pot:CellLiftPot",
     "CellLoadTray-v1": "tasks.cells.load_tray:CellLoadTray",

@@ -30,6 +30,7 @@ CATALOGUE = {
     "CellCrossOver-v1": "robot_layouts.experts.cells.cross_over:cross_over",
     "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
     "CellHoldAndPush-v1": "robot_layouts.experts.cells.hold_and_push:hold_and_push",
+    "CellRakeAndPlace-v1": "robot_layouts.experts.cells.rake_and_place:rake_and_place",
     "CellLiftBoard-v1": "robot_layouts.experts.cells.lift_board:lift_board",
     "CellLiftPot-v1": "robot_layouts.experts.cells.lift_pot:lift_pot",
     "CellLoadTray-v1": "robot_layouts.experts.cells.load_tray:load_tray",
