@@ -16,7 +16,7 @@ from robots.descriptor import Quaternion
 
 MOST = 48
 WIDEST, NARROWEST = 0.094, 0.003  # m; what fingers that part by 10 cm can be closed on
-_POINTS = 300  # on the surface that are tried
+POINTS = 300  # on the surface that are tried
 _WAYS = 12  # round each of them, from which the gripper comes
 _OPPOSITE = np.cos(np.radians(12))  # between the two sides that are held
 _GAP = 0.016  # m; where no finger fits between two parts, they are held together
@@ -48,6 +48,7 @@ def proposed(
     lying: Quaternion,
     part: str = "body",
     most: int = MOST,
+    points: int = POINTS,
 ) -> tuple[Grasp, ...]:
     """Return grasps of some convex shapes, well spread; the same ones each time.
 
@@ -61,13 +62,14 @@ def proposed(
         lying: How the thing is turned on its table, wxyz: grippers come from above it.
         part: What is held, as `Grasp.part` has it.
         most: How many there may be.
+        points: How many on the surface are tried.
     """
     solids = [_solid(shape) for shape in everything if shape.collides]
     own = [_solid(shape) for shape in held if shape.collides]
     up = rotate(np.array(lying) * (1, -1, -1, -1), np.array([0.0, 0.0, 1.0]))
     table = min(float((surface(s).corners @ up).min()) for s in everything if s.collides)
     tried = list[tuple[float, Floats, Floats, float]]()
-    for middle, closing, width in _opposite(held, own):
+    for middle, closing, width in _opposite(held, own, points):
         aside = float(np.linalg.norm(np.cross(centre - middle, closing)))
         for approach in _around(closing):
             if approach @ up <= _FROM_ABOVE:
@@ -109,14 +111,14 @@ def _solid(shape: Shape) -> _Solid:
 
 
 def _opposite(
-    held: Sequence[Shape], solids: Sequence[_Solid]
+    held: Sequence[Shape], solids: Sequence[_Solid], tried: int
 ) -> Iterator[tuple[Floats, Floats, float]]:
     """Yield the middle between opposite sides, the way in which fingers close, and the width."""
     shapes = [shape for shape in held if shape.collides]
     areas = [np.linalg.norm(surface(shape).normals, axis=1).sum() for shape in shapes]
     random = np.random.default_rng(0)
     for shape, solid, area in zip(shapes, solids, areas, strict=True):
-        count = max(round(_POINTS * area / sum(areas)), 12)
+        count = max(round(tried * area / sum(areas)), 12)
         points = sampled(surface(shape), count, random)
         sides = (points @ solid.normals.T - solid.offsets).argmax(axis=1)
         for point, normal in zip(points, solid.normals[sides], strict=True):

@@ -13,7 +13,7 @@ import numpy as np
 from objects.descriptor import ObjectDescriptor
 from objects.family import Made
 from objects.files.convex import MOST_PARTS, convex_parts, hull_volume
-from objects.files.grasps import proposed
+from objects.files.grasps import POINTS, proposed
 from objects.files.remembering import Files, remembered
 from objects.files.rests import resting
 from objects.shapes import GREY, Color, ConvexHull, Friction, Mesh, Shape
@@ -35,6 +35,7 @@ _TURNS: dict[str, Quaternion] = {  # from the file's frame to one whose z axis p
     "z": IDENTITY,
 }
 _WATER = 1000.0  # kg/m³
+_FEW, _MANY = 20, 8  # grasps, and how many times as many places are tried where there are fewer
 
 
 def thing_from_mesh(
@@ -102,7 +103,10 @@ def _made(file: Path, options: tuple[str, float, str, int]) -> tuple[Made, Files
     )
     centre = mass_of(hulls).centre
     rests = resting([corner for corners in parts for corner in corners], centre)
-    grasps = proposed(hulls, hulls, centre, next(iter(rests.values())))
+    lying = next(iter(rests.values()))
+    grasps = proposed(hulls, hulls, centre, lying)
+    if len(grasps) < _FEW:
+        grasps = proposed(hulls, hulls, centre, lying, points=_MANY * POINTS)
     return Made([drawn, *hulls], grasps, rests=rests), {}
 
 

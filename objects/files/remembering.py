@@ -18,7 +18,7 @@ from robot_layouts.core.files import read_text
 from robot_layouts.core.paths import default_root
 from robots.assets.assembled import write_folder
 
-VERSION = 1  # of what is made of files; another one makes them anew
+VERSION = 2  # of what is made of files; another one makes them anew
 FOLDER, THING = "objects", "object.json"
 _LARGEST = 1 << 26  # bytes
 _KINDS = {kind.__name__: kind for kind in SIZED}

@@ -109,6 +109,20 @@ def test_the_instruction_says_in_which_order_cubes_are_stacked():
         assert info["success"].tolist() == [True, False]
 
 
+def test_a_gear_counts_once_it_is_on_the_seat_of_its_own_shaft():
+    with closing(tasks.make("CellMountGears-v1")) as env:
+        env.reset(seed=0)
+        seats = {
+            arm: (*env.state.position(f"shaft_{arm}")[0, :2].tolist(), 0.0096)
+            for arm in env.layout.arms
+        }
+        others = {f"gear_{arm}": seats[arm] for arm in ("first", "second")}
+        assert put(env, **others)["are_two_on"].item()
+        beside = tuple(np.add(seats["third"], (0.03, 0.0, 0.0)))
+        assert not put(env, **others, gear_third=beside)["success"].item()
+        assert put(env, **others, gear_third=seats["third"])["success"].item()
+
+
 def test_cubes_belong_on_the_side_of_the_neighbour():
     with closing(tasks.make("CellCrossOver-v1")) as env:
         env.reset(seed=0)

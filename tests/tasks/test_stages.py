@@ -134,7 +134,7 @@ class TestInstructions:
             mask = np.array([False, True])
             vector.reset(seed=3)
             info = vector.reset(seed=[None, 7], options={"reset_mask": mask})[1]
-            assert info["instruction"].tolist() == ["", PHRASES[1]]
+            assert info["instruction"].tolist() == [None, PHRASES[1]]
 
     def test_lerobot_asks_for_that_of_each_environment(self):
         with closing(tasks.lerobot_vec_env("StagedLift-v1", 2, 0)) as env:
