@@ -46,6 +46,7 @@ CATALOGUE = {
     "CellPutAndClose-v1": "tasks.cells.put_and_close:CellPutAndClose",
     "CellPutAway-v1": "tasks.cells.put_away:CellPutAway",
     "CellRaiseFrame-v1": "tasks.cells.raise_frame:CellRaiseFrame",
+    "CellRakeAndPlace-v1": "tasks.cells.rake_and_place:CellRakeAndPlace",
     "CellRunPlant-v1": "tasks.cells.run_plant:CellRunPlant",
     "CellServe-v1": "tasks.cells.serve:CellServe",
     "CellSetFaders-v1": "tasks.cells.set_faders:CellSetFaders",

@@ -43,6 +43,7 @@ CATALOGUE = {
     "CellPutAndClose-v1": "robot_layouts.experts.cells.put_and_close:put_and_close",
     "CellPutAway-v1": "robot_layouts.experts.cells.put_away:put_away",
     "CellRaiseFrame-v1": "robot_layouts.experts.cells.raise_frame:raise_frame",
+    "CellRakeAndPlace-v1": "robot_layouts.experts.cells.rake_and_place:rake_and_place",
     "CellRunPlant-v1": "robot_layouts.experts.cells.run_plant:run_plant",
     "CellServe-v1": "robot_layouts.experts.cells.serve:serve",
     "CellSetFaders-v1": "robot_layouts.experts.cells.set_faders:set_faders",

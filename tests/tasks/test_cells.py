@@ -148,3 +148,15 @@ def test_a_ball_beside_the_board_is_not_on_it():
             env.simulation.worlds[0].set_pose("ball", (x + off, y, z + 0.03))
             found.append(env.task.evaluate(env.simulation.read())["is_high"].item())
         assert found == [True, False]
+
+
+@pytest.mark.parametrize(("first", "second", "solved"), [(0, 1, True), (1, 0, False)])
+def test_raked_blocks_belong_in_the_box_of_their_side(first: int, second: int, solved: bool):
+    with closing(tasks.make("CellRakeAndPlace-v1")) as env:
+        info = env.reset(seed=0)[1]
+        assert not info["are_near"].item()
+        boxes = [env.state.position(f"box_{side}")[0, :2].tolist() for side in ("left", "right")]
+        inside = {"block_left": (*boxes[first], 0.03), "block_right": (*boxes[second], 0.03)}
+        info = put(env, **inside)
+        assert info["are_near"].item()
+        assert info["success"].item() is solved
