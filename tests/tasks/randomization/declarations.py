@@ -39,4 +39,5 @@ EVERY_AXIS = replace(
     colors={"left": Surface(green=Uniform(0, 1), share=0.5)},
     textures={"table-workspace": Texture()},
     distractors=Distractors(count=Whole(0, 4)),
+    spread=Uniform(0.2, 1.0),
 )
