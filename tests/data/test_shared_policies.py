@@ -122,6 +122,19 @@ def test_a_recording_names_who_acted(hub, folder, tmp_path):
     assert len(source["sha256"]) == 64
 
 
+def test_files_that_lie_are_refused_in_words(folder):
+    policy = SharedPolicy.load(folder)
+    turned = [{"key": "extra/goal_pos", "symmetry": "cube"}]
+    wrong = SharedPolicy({**DECLARED, "observed": turned}, network(), "lying")
+    env = tasks.make(TASK, obs_mode="state_dict")
+    seen, _ = env.reset(seed=0)
+    env.close()
+    with pytest.raises(TaskError, match="lying takes 'extra/goal_pos' for the pose of a cube"):
+        wrong(seen)
+    with pytest.raises(TaskError, match="no number|lack a tensor 'unit'"):
+        SharedPolicy(policy.declared, {**network(), "unit": np.float32(1)}, "lying")
+
+
 def test_it_looks_again_after_the_actions_it_plays(folder):
     policy = SharedPolicy.load(folder)
     env = tasks.make(TASK, obs_mode="state_dict")

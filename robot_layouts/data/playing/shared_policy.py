@@ -102,7 +102,7 @@ class SharedPolicy:
         self.declared, self.name, self.files = declared, name, [*files]
         found = {key: list(tensor.shape) for key, tensor in weights.items()}
         inputs = (found.get("mean") or [0])[0]
-        if (most := max(declared["switches"], default=0)) >= found.get("unit", [0])[0]:
+        if (most := max(declared["switches"], default=0)) >= (found.get("unit") or [0])[0]:
             raise TaskError(f"{name}: its chunks have no number {most}, which would be a switch")
         for key, shape in _shapes(declared, inputs):
             if found.pop(key, None) != shape:
@@ -182,6 +182,8 @@ class SharedPolicy:
             raise TaskError(f"{self.name} observes {about['key']!r}, which is not observed here")
         if "symmetry" not in about:
             return part.reshape(-1).float()
+        if part.shape != (1, 7):
+            raise TaskError(f"{self.name} takes {about['key']!r} for the pose of a cube")
         turned = torch.from_numpy(rotation_of(part[0, 3:].numpy())).float()
         return torch.cat([part[0, :3], (turned**3 @ turned.mT).flatten()])
 
