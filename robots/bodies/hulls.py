@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from robot_layouts.core.disk_cache import cached
 from robot_layouts.core.errors import AssetError
 from robot_layouts.core.importing import optional
 from robot_layouts.kinematics.rotations import Floats
@@ -19,7 +21,7 @@ from robot_layouts.kinematics.tree import Tree
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
 from robots.descriptor import RobotDescriptor
 from robots.urdf.cleaning.xacro_files import template_of
-from robots.urdf.mesh_files import has_volume, read_corners
+from robots.urdf.mesh_files import has_volume, read_corners, read_mesh, refers_to_shapes
 from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
 from robots.urdf.reading import model_of
@@ -27,6 +29,7 @@ from robots.urdf.srdf import srdf_beside
 from robots.urdf.tree import kinematic_tree
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost
+_METHOD = b"hull 1"  # to be raised when the same shape comes to another hull
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,10 +143,27 @@ def _load(robot: RobotDescriptor, urdf: Path, _stamps: tuple[int, ...]) -> Robot
 def _hulls(model: UrdfModel, urdf: Path, _stamp: int) -> tuple[Hull, ...]:
     tree = kinematic_tree(model)  # every tree of a model has its links in the same order
     return tuple(
-        convex_hull(tree.link(link), shape_corners(shape, urdf), shape.where)
+        _hull(tree.link(link), *_found(shape, urdf))
         for link in model.links
         for shape in model.collisions.get(link, ())
     )
+
+
+def _found(shape: UrdfShape, urdf: Path) -> tuple[Floats, Floats]:
+    """Return corners (m) and triangles of a shape's hull, from the cache if it was found before."""
+    path, contents = urdf.as_posix(), b""
+
+    def find() -> tuple[Floats, Floats]:
+        return _corners_and_faces(shape_corners(shape, urdf), shape.where)
+
+    if shape.kind == "mesh":
+        path = resolve(shape.file, path, os.path.isfile)
+        if refers_to_shapes(path):
+            return find()
+        contents = read_mesh(path, shape.where)
+    asked = json.dumps((shape.kind, shape.sizes, shape.origin.tolist())).encode()
+    corners, triangles = cached(path, (_METHOD, asked, contents), find)
+    return np.array(corners, float), np.array(triangles, int)
 
 
 def shape_corners(shape: UrdfShape, urdf: Path) -> Floats:
@@ -199,7 +219,11 @@ def convex_hull(link: int, corners: Floats, where: str) -> Hull:
     Raises:
         AssetError: If it has no volume.
     """
-    import fcl
+    return _hull(link, *_corners_and_faces(corners, where))
+
+
+def _corners_and_faces(corners: Floats, where: str) -> tuple[Floats, Floats]:
+    """Return the corners of the convex hull of points, (n, 3), and its triangles, (m, 3)."""
     import trimesh
 
     if not (np.isfinite(corners).all() and has_volume(corners)):
@@ -208,6 +232,11 @@ def convex_hull(link: int, corners: Floats, where: str) -> Hull:
         hull: Any = trimesh.convex.convex_hull(corners)
     except Exception as error:  # qhull's own, for what is all but flat
         raise AssetError(f"{where}: a collision shape without a volume") from error
-    vertices, triangles = np.asarray(hull.vertices, float), np.asarray(hull.faces, int)
+    return np.asarray(hull.vertices, float), np.asarray(hull.faces, int)
+
+
+def _hull(link: int, corners: Floats, triangles: Floats) -> Hull:
+    import fcl
+
     faces = np.concatenate([np.full((len(triangles), 1), 3), triangles], axis=1)
-    return Hull(link, vertices, fcl.Convex(vertices, len(triangles), faces.flatten()))
+    return Hull(link, corners, fcl.Convex(corners, len(triangles), faces.flatten()))

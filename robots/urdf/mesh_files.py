@@ -83,7 +83,7 @@ def load_scene(path: str, where: str, urdf: str | None = None, **options: Any) -
             f"{where}: the mesh {path} ends in {ending or 'nothing'}; meshes end in"
             f" {', '.join(ENDINGS)}"
         )
-    contents = _read(path, where)
+    contents = read_mesh(path, where)
     beside: Any = _SideFiles(path, urdf, where)
     beside.expect_allowed(ending, contents)
     try:
@@ -184,6 +184,11 @@ def expect_near(corners: Floats, path: str, where: str) -> None:
         )
 
 
+def refers_to_shapes(path: str) -> bool:
+    """Return whether a mesh may have its shape in other files, which its own only names."""
+    return posixpath.splitext(path)[1].lower() in (".glb", ".gltf")
+
+
 def has_body(path: str, scale: Sequence[float], where: str, urdf: str) -> bool:
     """Tell whether a mesh that collides can be touched: whether it is not flat.
 
@@ -220,7 +225,7 @@ def _has_body(
 
     if posixpath.splitext(path)[1].lower() in _REFERENCES:
         return read()  # what it refers to counts, too
-    return cached(path, (_METHOD, repr(scale).encode(), _read(path, where)), read)
+    return cached(path, (_METHOD, repr(scale).encode(), read_mesh(path, where)), read)
 
 
 def has_volume(corners: Floats) -> bool:
@@ -247,7 +252,16 @@ def binary_stl(triangles: Floats) -> bytes:
     return bytes(80) + struct.pack("<I", len(triangles)) + records.tobytes()
 
 
-def _read(path: str, where: str) -> bytes:
+def read_mesh(path: str, where: str) -> bytes:
+    """Return the contents of a mesh's file.
+
+    Args:
+        path: The file.
+        where: What refers to it, for messages.
+
+    Raises:
+        AssetError: If it cannot be read, or is larger than `MAX_MESH_BYTES`.
+    """
     try:
         return read_regular(path, MAX_MESH_BYTES)
     except UnreadableFileError as error:
@@ -296,7 +310,7 @@ class _SideFiles:
             found = found or path
         if not found:
             raise FileNotFoundError(name)
-        return _read(found, self._where)
+        return read_mesh(found, self._where)
 
     __getitem__ = get
 

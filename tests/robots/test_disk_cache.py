@@ -7,12 +7,16 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import fcl
 import numpy as np
 import pytest
 
 from robot_layouts.core.disk_cache import FOLDER, cached
 from robot_layouts.core.errors import AssetError
+from robot_layouts.kinematics.rotations import Floats
+from robots.bodies.hulls import Hull, read_hulls
 from robots.urdf.mesh_files import binary_stl, has_body
+from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.reading import read_model
 from tests.fresh_process import in_fresh_process
 from tests.three_links import arm, save
@@ -118,6 +122,41 @@ def test_whether_a_mesh_has_a_body_goes_with_its_contents(root: Path):
         os.utime(mesh, ns=(0, len(entries(root))))
         assert has_body(str(mesh), (1, 1, 1), "a link", "kit.urdf") is (contents is thick)
     assert len(entries(root)) == 2
+
+
+def of_shapes(root: Path, *shapes: UrdfShape) -> UrdfModel:
+    (root / "kit.urdf").touch()
+    return UrdfModel("kit", ("base",), (), {"base": shapes}, {}, {})
+
+
+def read_again(model: UrdfModel, root: Path, number: int) -> tuple[Hull, ...]:
+    os.utime(root / "kit.urdf", ns=(0, number))  # what a process remembers is out of date then
+    return read_hulls(model, root / "kit.urdf")
+
+
+def test_hulls_come_back_as_they_were(root: Path, monkeypatch: pytest.MonkeyPatch):
+    corners = np.random.default_rng(0).normal(size=(8, 3, 3))
+    (root / "part.stl").write_bytes(binary_stl(corners))
+    mesh = UrdfShape("mesh", (1.0, 2.0, 1.0), "part.stl", np.eye(4), "a link")
+    capsule = UrdfShape("capsule", (0.1, 0.3), "", np.eye(4), "a link")
+    model = of_shapes(root, mesh, capsule)
+    first = read_again(model, root, 0)
+    assert len(entries(root)) == 2
+    monkeypatch.setattr("robots.bodies.hulls.shape_corners", None)  # nothing is read again
+    for hull, again in zip(first, read_again(model, root, 1), strict=True):
+        assert hull.corners.tobytes() == again.corners.tobytes()
+        assert fcl.distance(*map(fcl.CollisionObject, (hull.geometry, again.geometry))) <= 0
+
+
+def test_a_mesh_that_changed_has_another_hull(root: Path):
+    corners = np.random.default_rng(0).normal(size=(8, 3, 3))
+    model = of_shapes(root, UrdfShape("mesh", (1.0, 1.0, 1.0), "part.stl", np.eye(4), "a link"))
+    found: list[Floats] = []
+    for number, scale in enumerate((1.0, 2.0)):
+        (root / "part.stl").write_bytes(binary_stl(scale * corners))
+        (hull,) = read_again(model, root, number)
+        found.append(np.ptp(hull.corners, axis=0))
+    assert found[1] == pytest.approx(2 * found[0])
 
 
 def packages_of_a_task() -> list[str]:
