@@ -50,16 +50,19 @@ def apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
     return larger if smaller < UNEQUAL * larger else max(HAND_OVER * (smaller + larger), larger)
 
 
-def farther(robots: Sequence[RobotDescriptor], own: Sequence[RobotDescriptor]) -> list[float]:
+def farther(reaches: Sequence[float], own: Sequence[float]) -> list[float]:
     """Return by which factors robots stand farther from what they do than those they stand in for.
 
     What those do is in reach of the one of them that reaches least. One that reaches less than that
     stands nearer; none stands farther than as all of them reach farther.
+
+    Args:
+        reaches: How far the robots reach (m).
+        own: How far those do that they stand in for (m).
     """
-    least = min(other.reach for other in own)
-    reaches = [robot.reach / least for robot in robots]
-    most = max(1.0, min(reaches))
-    return [min(reach, most) for reach in reaches]
+    factors = [reach / min(own) for reach in reaches]
+    most = max(1.0, min(factors))
+    return [min(factor, most) for factor in factors]
 
 
 def gaps(row: Iterable[RobotDescriptor], more: float = 0.0) -> list[float]:

@@ -30,6 +30,7 @@ CLEARANCE, STEP = 0.02, 0.01  # m: from a body to the table; in which it is move
 POSTURES = 21  # of a torso that are looked at
 HIGHEST = 0.5  # of a reach, by which a robot is raised at most
 HEIGHT = 0.22  # of a reach: how high above the ground hands wait
+BACK = 0.35  # of a reach: how far ahead a hand waits that is drawn back
 ASIDE = 0.15  # of a reach: how far aside from the middle of what is worked on, at least
 DOWN = 0.5  # of a reach, that a gripper is worth which points down instead of level
 STARTS = 100  # random postures that hands are brought to their places from
@@ -61,13 +62,47 @@ def made_ready(
     """
     random = np.random.default_rng(0)
     for limb in limbs:
-        for qpos in _postures(placement, limb, place):
-            ready = replace(placement, keyframe=None, qpos=[round(at, 4) for at in qpos.tolist()])
-            noisier = replace(ready, qpos_noise=min(NOISIER * ready.qpos_noise, LARGEST_NOISE))
-            draws = noisy_postures(noisier, NOISES, random)
-            if are_clear(placement, limb, draws, table, alone=False).all():
-                placement = ready
-                break
+        arm, shoulder = placement.robot.parts[limb], placement.robot.limbs[limb].base[1]
+        aside = np.sign(shoulder) * max(abs(shoulder), ASIDE * arm.reach)
+        left = pose_matrix(placement.base_position, placement.base_quaternion)[:3, 1]
+        at = (*place, HEIGHT * arm.reach) + aside * left
+        placement = _over(placement, limb, at, table, random)
+    return placement
+
+
+def drawn_back(placement: Placement, place: tuple[float, float]) -> Placement:
+    """Return the placement of an arm that starts with its hand near it, gripper down.
+
+    One that has no such posture stays as it is.
+
+    Args:
+        placement: The arm.
+        place: What it is to face, x and y (m, world).
+
+    Raises:
+        AssetError: If robot files cannot be found.
+        MissingPackageError: If python-fcl is not installed.
+    """
+    base, reach = np.array(placement.base_position), placement.robot.reach
+    ahead = np.array((*place, base[2])) - base
+    at = base + BACK * reach * ahead / np.linalg.norm(ahead) + (0.0, 0.0, HEIGHT * reach)
+    return _over(placement, "", at, None, np.random.default_rng(0))
+
+
+def _over(
+    placement: Placement,
+    limb: str,
+    at: Floats,
+    table: Rectangle | None,
+    random: np.random.Generator,
+) -> Placement:
+    """Return a placement whose robot, or a limb of it, starts with its hand at a place."""
+    for qpos in _postures(placement, limb, at):
+        ready = replace(placement, keyframe=None, qpos=[round(at, 4) for at in qpos.tolist()])
+        noisier = replace(ready, qpos_noise=min(NOISIER * ready.qpos_noise, LARGEST_NOISE))
+        draws = noisy_postures(noisier, NOISES, random)
+        if are_clear(placement, limb, draws, table, alone=False).all():
+            return ready
     return placement
 
 
@@ -172,14 +207,15 @@ def off_the_table(
     )
 
 
-def _postures(placement: Placement, limb: str, place: tuple[float, float]) -> Floats:
-    """Return postures in which a limb is ready, the most comfortable first, (n, dof) (rad, m)."""
-    robot, arm, tree = placement.robot, placement.robot.parts[limb], link_tree(placement.robot)
+def _postures(placement: Placement, limb: str, target: Floats) -> Floats:
+    """Return postures that bring a hand to a place, gripper down, (n, dof) (rad, m).
+
+    The most comfortable comes first. The limb is empty if the robot has but one hand.
+    """
+    robot, tree = placement.robot, link_tree(placement.robot)
+    arm = robot.parts[limb] if limb else robot
     columns = [robot.joints.index(joint) for joint in arm.arm_joints]
     base = pose_matrix(placement.base_position, placement.base_quaternion)
-    shoulder = robot.limbs[limb].base[1]
-    aside = np.sign(shoulder) * max(abs(shoulder), ASIDE * arm.reach)
-    target = (*place, HEIGHT * arm.reach) + aside * base[:3, 1]
     places, approaches = places_and_approaches(robot, arm)
     away = np.linalg.norm(transform(base, places) - target, axis=1)
     away += DOWN * arm.reach * (approaches @ base[2, :3])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Iterable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from math import sqrt
@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts.arrangement import Arrangement
+from layouts.distances import in_catalogue
 from layouts.frames import Rectangle
 from layouts.placement import Placement
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
 from robot_layouts.kinematics.solve import scattered
 from robot_layouts.kinematics.tree import Tree
-from robots import MissingPackageError, RobotDescriptor
+from robots import AssetError, MissingPackageError, RobotDescriptor
 from robots.bodies.hulls import load_model
 from robots.bodies.overlaps import overlapping
 from robots.gripper_motion import aiming_joints, gripper_frame, home_of, link_tree
@@ -28,6 +29,12 @@ _CELL = 0.05  # of the shorter reach: edge of the cells that places are counted 
 HEIGHT = 0.35  # of the shorter reach: how high above the ground places are looked for
 _DEEP = 0.8  # of the depth of the deepest place, that is deep enough
 _OFTEN = 3  # samples in a cell and its neighbours that show it to be well within reach
+_MANY = 20  # postures with the gripper down that show how far it gets so
+# Of postures in which a gripper can take what lies on the ground: the height, as a share of the
+# reach; the cosine from straight down; which share of them reaches less far; how that is rounded.
+_LOW, _UPRIGHT, _FAR, _ROUNDED = 0.25, 0.94, 0.9, 0.05
+# What `_share_down` finds of the robots that tasks are declared for, whose files need not be there.
+SHARES_DOWN = {"panda": 0.9, "panda_wristcam": 0.9, "franka_panda": 0.9}
 
 
 def shared_place(
@@ -80,6 +87,47 @@ def shared_place(
     return (x, y), float(depths[tuple(found)])
 
 
+def working_reaches(
+    layout: Arrangement, places: Iterable[str], holding: Container[str]
+) -> list[float]:
+    """Return how far arms of a layout reach where they work (m).
+
+    Those that hold things do with their grippers about straight down, near the ground they stand
+    on: random postures say how far from their bases. It is the reach of their descriptors for all
+    others, and for those on wheels, that hardly get there, or whose files are not at hand.
+
+    Args:
+        layout: The robots.
+        places: The arms, by their places.
+        holding: The places whose robots hold things.
+    """
+    return [
+        layout.arm(place).robot.reach * (_share_down(layout, place) if place in holding else 1.0)
+        for place in places
+    ]
+
+
+def _share_down(layout: Arrangement, place: str) -> float:
+    """Return at which share of its reach an arm still gets to the ground with its gripper down."""
+    arm, owner = layout.arm(place), layout[layout.owner(place)]
+    if owner.robot.no_floor_contact:  # its arm works far above the ground it stands on
+        return 1.0
+    if arm.robot.name in SHARES_DOWN and in_catalogue(arm.robot):
+        return SHARES_DOWN[arm.robot.name]
+    base = pose_matrix(owner.base_pose.position, owner.base_pose.quaternion)
+    body = body_joints(owner, arm.robot)
+    try:
+        points, approaches = places_and_approaches(owner.robot, arm.robot, body)
+    except AssetError:
+        return 1.0
+    points = (transform(base, points) - arm.base_position) / arm.robot.reach
+    low = (points[:, 2] > 0) & (points[:, 2] < _LOW)
+    far = np.hypot(*points[low & ((approaches @ base[:3, :3].T)[:, 2] < -_UPRIGHT), :2].T)
+    if len(far) < _MANY:
+        return 1.0
+    return round(round(float(np.quantile(far, _FAR)) / _ROUNDED) * _ROUNDED, 2)
+
+
 def _near_ground(layout: Arrangement, place: str, height: float, table: Rectangle | None) -> Floats:
     """Return where postures bring a TCP that is low and points down, (n, 2) (m, world)."""
     owner, arm = layout[layout.owner(place)], layout.arm(place).robot
@@ -107,7 +155,7 @@ def are_clear(
 
     Args:
         placement: The body.
-        limb: One of its limbs.
+        limb: One of its limbs; empty for all of a robot that has none.
         qpos: All joints of the body, (n, dof) (rad, m).
         table: Outline of a table whose top is at z = 0 (m).
         alone: Whether the other limbs do not count.
@@ -117,7 +165,8 @@ def are_clear(
         MissingPackageError: If python-fcl is not installed.
     """
     model, robot = load_model(placement.robot), placement.robot
-    carried = {name: _carried(model.kinematics, robot, robot.parts[name]) for name in robot.limbs}
+    parts = {name: robot.parts[name] for name in robot.limbs} if limb else {"": robot}
+    carried = {name: _carried(model.kinematics, robot, part) for name, part in parts.items()}
     own = carried.pop(limb)
     others = frozenset().union(*carried.values()) if alone else frozenset()
     links = [hull.link for hull in model.hulls]

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from operator import lt
 from typing import Any
 
 from layouts.distances import SHOULDER, farther, is_known_arm
 from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
+from layouts.validation.findings import Finding
 from robot_layouts.core.quoting import shown
 from robot_layouts.kinematics.quaternions import forward, yaw_quaternion
 from robots import (
@@ -25,18 +27,28 @@ from robots import (
 # Shares of a reach at which what is worked on lies ahead. A Panda of ManiSkill stands 0.615 m, or
 # 0.72 of its reach, behind the middle of its table; two arms of one body reach over all of it.
 ALONE, BODY = 0.72, 0.6
+FARTHEST, NOISES = (
+    1.5,
+    20,
+)  # times as far from the middle; draws of joint noise in which none collide
 Point = tuple[float, float]
 
 NAME = "robot"  # of the place of one robot that serves all roles
 
 
-def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> Layout:
+def at_task(
+    robots: RobotLike | Mapping[str, RobotLike],
+    task: Layout | Any,
+    *,
+    holding: Collection[str] | None = None,
+) -> Layout:
     """Return a task's layout with other robots, each where it reaches what the task's own does.
 
     A robot stands on the line from the task's own to the middle of what is worked on, turned
     towards it and at the same height: as much nearer as it reaches less than that one of the task's
-    own which reaches least, and farther only as far as all robots reach farther. It is raised, if
-    its wheels or feet are lower than its base.
+    own which reaches least, and farther only as far as all robots reach farther. What a robot
+    holds it has to reach with its gripper down. It is raised, if its wheels or feet are lower than
+    its base.
 
     One robot of several limbs serves several places at once: its limbs are called like them, the
     left one serving the first unless they are called so already, and its shoulders are above the
@@ -48,6 +60,8 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
     Args:
         robots: Robot by place, for some or all of them; or one robot for all.
         task: The task, its class, or a layout with its places.
+        holding: Places whose robots hold things; None for those that the task says need a gripper
+            which opens so wide.
 
     Raises:
         LayoutError: If the task has no layout, or more places than the robot has limbs.
@@ -69,34 +83,95 @@ def at_task(robots: RobotLike | Mapping[str, RobotLike], task: Layout | Any) -> 
             outline = table.outline(layout) if table is not None else None
             return Layout({NAME: _body(robot, layout, outline)}, layout.frames)
         robots = dict.fromkeys(layout, robot)
+    from layouts.shared_place import working_reaches
+
     loaded = load_robots(robots)
     for place in loaded:
         if place not in layout:
             raise UnknownNameError("robot of this layout", place, layout)
     middle = _middle(layout)
-    own = [placement.robot for placement in layout.values()]
-    after = [loaded.get(place, placement.robot) for place, placement in layout.items()]
-    factors = dict(zip(layout, farther(after, own), strict=True))
-    changed = {
-        place: _moved(layout[place], robot, middle, factors[place])
-        for place, robot in loaded.items()
-    }
-    return Layout({**layout, **changed}, layout.frames)
+    holding = held_widths(task, layout) if holding is None else holding
+    places = {place: _with(at, loaded.get(place, at.robot)) for place, at in layout.items()}
+    both = Layout(places, layout.frames), layout
+    factors = farther(*(working_reaches(each, layout, holding) for each in both))
+    by_reach = farther(*(working_reaches(each, layout, ()) for each in both))
+
+    def placed(share: float) -> Layout:
+        moved = {
+            place: _moved(layout[place], loaded[place], middle, share * factor)
+            for place, factor in zip(layout, factors, strict=True)
+            if place in loaded
+        }
+        return Layout({**layout, **moved}, layout.frames)
+
+    if not any(map(lt, factors, by_reach)):  # else they stand nearer to each other than is usual
+        return placed(1.0)
+    arms = [place for place in loaded if place in holding and not loaded[place].limbs]
+    return _apart(placed, arms, middle)
+
+
+def _apart(placed: Callable[[float], Layout], arms: Sequence[str], middle: Point) -> Layout:
+    """Return a layout whose robots do not collide as they start; the nearest one if none is found.
+
+    Args:
+        placed: Makes one, with robots farther from the middle by a factor.
+        arms: Those that are drawn back before all stand farther apart.
+        middle: Of what they work on, x and y (m).
+    """
+    from layouts.ready import drawn_back
+
+    share, back = 1.0, False
+    with suppress(AssetError, MissingPackageError):  # else their bodies are not known here
+        while share < FARTHEST:
+            layout = placed(share)
+            if back:
+                ready = {place: drawn_back(layout[place], middle) for place in arms}
+                layout = Layout({**layout, **ready}, layout.frames)
+            report = layout.validate(workspaces=False, samples=NOISES)
+            found = [finding for finding in report.findings if finding.kind == "collision"]
+            if not found:
+                return layout
+            share *= max(_factor(layout, finding) for finding in found) if back else 1.0
+            back = True
+    return placed(1.0)
+
+
+def _factor(layout: Layout, finding: Finding) -> float:
+    """Return by which factor two robots have to stand farther apart so that they do not collide."""
+    (x, y, _), (u, v, _) = (layout[robot].base_position for robot in finding.robots)
+    apart = math.hypot(x - u, y - v)
+    return FARTHEST if finding.farther is None or not apart else 1 + finding.farther / apart
+
+
+def held_widths(task: Layout | Any, places: Iterable[str]) -> dict[str, float]:
+    """Return how wide the things are that a task's robots hold, by place (m); none of a layout.
+
+    Args:
+        task: The task, or its class, whose ``needs`` say how wide grippers must open.
+        places: Its places.
+    """
+    needs = getattr(task, "needs", {})
+    found = {place: needs.get(place, needs.get("*")) for place in places}
+    return {place: need.opening for place, need in found.items() if need and need.opening}
+
+
+def _with(placement: Placement, robot: RobotDescriptor) -> Placement:
+    """Return a placement with another robot, at home where it lacks the keyframe."""
+    if placement.keyframe not in robot.keyframes:
+        placement = replace(placement, keyframe=None)
+    return placement.with_robot(robot)
 
 
 def _moved(placement: Placement, robot: RobotDescriptor, middle: Point, factor: float) -> Placement:
     """Return a placement with another robot, as much farther from the middle as a factor says."""
-    if placement.keyframe not in robot.keyframes:
-        placement = replace(placement, keyframe=None)
     if robot == placement.robot:
-        return placement.with_robot(robot)
-    if placement.on is not None:
-        moved = placement.with_robot(robot)
-    else:
+        return placement
+    moved = _with(placement, robot)
+    if placement.on is None:
         *flat, z = placement.base_position
         x, y = (round(m + (at - m) * factor, 4) for m, at in zip(middle, flat, strict=True))
         turned = faced(robot, placement.facing)
-        moved = replace(placement, robot=robot, position=(x, y, z), quaternion=turned, rpy=None)
+        moved = replace(moved, position=(x, y, z), quaternion=turned, rpy=None)
     if not is_known_arm(robot):
         from layouts.ready import grounded
 

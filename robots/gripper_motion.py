@@ -103,6 +103,10 @@ class GripperMotion:
         wide = np.flatnonzero(self.openings >= opening)
         return float(SHARES[wide[0]]) if len(wide) else float(SHARES[self.openings.argmax()])
 
+    def angle(self, share: float) -> float:
+        """Return how far the pads are turned against each other at a share (rad)."""
+        return float(np.interp(share, SHARES, self.angles))
+
     def slope(self, share: float) -> float:
         """Return how much wider the gripper opens per share there (m)."""
         low, high = np.clip((share - 0.05, share + 0.05), 0.0, 1.0)

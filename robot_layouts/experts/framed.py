@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from robot_layouts.experts.geometry import turn
+from robot_layouts.experts.grips import Grip
 from robot_layouts.experts.script import Pose, Scene, Script, Waypoint
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation.framed import Fit, FramedState
@@ -37,9 +38,7 @@ class FramedScene(Scene):
             j for body in self.bodies if body.name == name for j in body.joints if j.name == joint
         )
         far = self._fit.length(position) if moved.kind == "slide" else position
-        place, turned = self._world.part(name, joint, far)
-        x, y, z = place.tolist()
-        return np.array(self._fit.declared((x, y, z))), multiply(turn("z", -self._fit.yaw), turned)
+        return self._declared(self._world.part(name, joint, far))
 
     def scale(self, name: str) -> float:
         """Return how much larger a body is in this episode than it was declared, as a factor."""
@@ -49,6 +48,13 @@ class FramedScene(Scene):
         """Return where the base of a robot or a limb stands, (3,)."""
         x, y, z = super().base(robot).tolist()
         return np.array(self._fit.declared((x, y, z)))
+
+    def _between_jaws(self, robot: str, grip: Grip) -> Pose:
+        return self._declared(self._world._between_jaws(robot, grip))
+
+    def _declared(self, pose: Pose) -> Pose:
+        (x, y, z), turned = pose[0].tolist(), pose[1]
+        return np.array(self._fit.declared((x, y, z))), multiply(turn("z", -self._fit.yaw), turned)
 
     def in_world(self, pose: Pose) -> Pose:
         """Return a pose of this scene's frame, position and quaternion, in the world (m)."""

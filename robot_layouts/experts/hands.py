@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from itertools import product
 from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts import single
+from robot_layouts.experts.grips import MIDDLE_DEPTHS, Grip, grip_of, swings
 from robot_layouts.experts.script import Scene
 from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
     pose_matrix,
-    quaternion_of,
     rotation_about,
 )
 from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
-from robot_layouts.simulation.checks.closing import Closing
-from robot_layouts.simulation.checks.trial import NAME
-from robots import RobotDescriptor
 from robots.action_split import is_gripper
-from robots.gripper_motion import SHARES, aiming_joints, gripper_motion, link_tree, wrist_of
+from robots.gripper_motion import aiming_joints, gripper_motion, link_tree, wrist_of
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 
@@ -36,15 +30,10 @@ FIRST_ITERATIONS, ITERATIONS = 12, 30
 NEAR, NEAR_TURN = 0.1, 0.8  # m and rad from a goal after the first of them
 RANDOM_STARTS = 3
 QUICK = 2.0  # times that quick drives nearly settle in a control step
-WIDER = (1.45, 2.0, 1.2)  # than a cube a gripper is open before it closes, in the order of trial
-ASIDE = (0.0, 0.25, -0.25, 0.5, -0.5)  # of its side: how far from the middle of the pads it may be
 FIRMNESSES = (1.0, 2.5)  # factors on the force with which a cube is held; the first that suffices
 CLOSING, STEP = 60.0, 4e-4  # N with which fingers close, at least; m per step, at least
 YIELD = 6e-5  # m that quick fingers are driven into what they hold, at least
-PARALLEL = 0.05  # rad; jaws that are turned less need no trial
 LEAST_SIDE = 0.012  # m; of the smallest cube that they are tried with
-MIDDLE_DEPTHS = (0.0, 0.2, -0.2, 0.4)  # shares of its side before the middle of the pads
-SLIPS = 0.1  # of a cube's side that it may move in a hand that is shaken
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,26 +59,6 @@ class HandPostures:
     def __getitem__(self, some: NDArray[np.intp]) -> HandPostures:
         """Return some of them, in that order."""
         return HandPostures(self.which[some], self.qpos[some], self.turns[some], self.off[some])
-
-
-@dataclass(frozen=True, eq=False)
-class Grip:
-    """How a gripper holds a box.
-
-    Attributes:
-        pose: Of the box in the TCP link's frame before it closes, (4, 4) (m): its y axis runs from
-            finger to finger, and its z axis about as the gripper points.
-        share: How far the gripper is open before it closes.
-        held: How far it is open when it holds the box.
-        firmness: Factor on the usual force with which it has to hold the box.
-        shut: Pose of the box in the TCP link's frame then.
-    """
-
-    pose: Floats
-    share: float
-    held: float
-    firmness: float
-    shut: Floats
 
 
 class Hand:
@@ -151,7 +120,7 @@ class Hand:
         Raises:
             RobotLayoutsError: If the robot cannot be built.
         """
-        return _grip(self._robot, self._limb, round(side, 6), depth, firmness, self._simulator)
+        return grip_of(self._robot, self._limb, side, depth, firmness, self._simulator)
 
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""
@@ -195,9 +164,8 @@ class Hand:
         Args:
             opening: How wide (m).
         """
-        share = self.motion.share(opening)
-        if self._turned(share) < PARALLEL:
-            return self.pointing(self.motion.middle(share))
+        if not swings(self.motion, opening):
+            return self.pointing(self.motion.middle(self.motion.share(opening)))
         side = max(opening, LEAST_SIDE)
         grips = (self.grip(side, depth) for depth in MIDDLE_DEPTHS)
         grip = next((grip for grip in grips if grip is not None), None)
@@ -216,10 +184,6 @@ class Hand:
         frame, middle = shut.copy(), self.motion.middle
         frame[:3, 3] += middle(self.motion.share(wider)) - middle(self.motion.share(opening))
         return frame
-
-    def _turned(self, share: float) -> float:
-        """Return how far the pads are turned against each other at a share (rad)."""
-        return float(np.interp(share, SHARES, self.motion.angles))
 
     def closing(self, opening: float) -> float:
         """Return the force with which it closes until it feels what is so wide (m) (N)."""
@@ -310,33 +274,6 @@ class Hand:
     def way(self, one: Floats, other: Floats) -> Floats:
         """Return how far the joint has to turn that turns farthest, (k,) (rad)."""
         return np.abs(one - other)[..., self.columns].max(axis=-1)
-
-
-@lru_cache(maxsize=64)
-def _grip(
-    robot: RobotDescriptor, limb: str, side: float, depth: float, firmness: float, simulator: str
-) -> Grip | None:
-    """See `Hand.grip`; the limb is what its name adds to the robot's."""
-    layout = single({NAME: robot})
-    own, closing = layout.arm(NAME + limb).robot, Closing(layout, NAME + limb, side, simulator)
-    motion, tree = gripper_motion(own), link_tree(robot)
-    gripper = [robot.joints.index(joint) for joint in motion.joints]
-    base, tcp = layout[NAME].base_pose, find_tcp(own, tree).turned
-    for wide, aside in product(WIDER, ASIDE):
-        share, qpos = motion.share(wide * side), np.array(layout[NAME].start_qpos, float)
-        qpos[gripper] = motion.positions(share)
-        pose = np.eye(4)
-        pose[:3, :3] = motion.turn
-        pose[:3, 3] = motion.middle(share) + motion.turn @ (0.0, aside * side, depth * side)
-        link = pose_matrix(base.position, base.quaternion) @ tree.forward(qpos[None])[0, tcp]
-        cube = link @ pose
-        place = cube[:3, 3], quaternion_of(cube[:3, :3])
-        if not closing.has_room(qpos, place):
-            continue
-        closed = closing.close(qpos, place, firmness)
-        if closed.held and closed.slipped < SLIPS * side:
-            return Grip(pose, share, closed.share, firmness, closed.pose)
-    return None
 
 
 def box_grips(turn: Floats, around: int = 12) -> Floats:

@@ -9,6 +9,8 @@ import numpy as np
 
 from robot_layouts.experts.driver import ArmDriver
 from robot_layouts.experts.geometry import heading
+from robot_layouts.experts.grips import Grip, role_grip
+from robot_layouts.experts.hands import Hand
 from robot_layouts.experts.script import OPEN, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
 from robot_layouts.experts.ways import NoWayError, Ways
@@ -21,6 +23,9 @@ PATIENCE = 40  # control steps without progress after which an arm counts as blo
 PROGRESS = 1e-3  # rad
 VIA = 0.06  # rad: so near an arm comes to each place of a way round before it goes on
 SETTLING, LEADING = 0.1, 0.2  # rad from its goal at which an arm settles; share of it per step
+# Share of the force with which jaws that swing close, that they hold a cube with: with more it
+# slips out in time, with less as it is lifted.
+HOLDING = 0.5
 AGAIN, WAITING = 4, 100  # control steps after which an arm that waits looks again, and gives up
 
 
@@ -30,6 +35,26 @@ class StuckError(Exception):
 
 class BlockedError(StuckError):
     """Something is in its way."""
+
+
+class _Jaws:
+    """What jaws that swing do instead of opening and closing all the way."""
+
+    def __init__(self, task: TaskEnv, robot: str, grip: Grip) -> None:
+        self._robot, self._share = robot, grip.share
+        self._closing = Hand(task, robot).closing(grip.side)
+
+    def move(self, number: float, scene: Scene) -> tuple[float | None, float | None]:
+        """Return how far they open, or the force with which they close (N).
+
+        Args:
+            number: Action number of the gripper, 1 to open, -1 to close.
+            scene: As it is now.
+        """
+        if number > 0:
+            return self._share, None
+        held = any(scene.grasps(self._robot, body.name) for body in scene.bodies)
+        return None, HOLDING * self._closing if held else self._closing
 
 
 class Player:
@@ -63,6 +88,7 @@ class Player:
         if any(waypoint.at is not None for waypoint in waypoints):
             self._reach = task.simulation.backend.point_reach(robot)
             self._base = scene.base(robot)
+        self._jaws = _Jaws(task, robot, grip) if (grip := role_grip(task, robot)) else None
         self._goal = self._driver.arm(scene.qpos(robot))
         self._gripper: float = OPEN
         self._share: float | None = None
@@ -115,7 +141,10 @@ class Player:
         self._elapsed += 1
         qpos = scene.qpos(self._robot)
         goal = self._goal + self._lead(scene)
-        return self._driver.action(goal, self._gripper, qpos, self._share, self._squeeze)
+        share, squeeze = self._share, self._squeeze
+        if self._jaws is not None and share is None and squeeze is None:
+            share, squeeze = self._jaws.move(self._gripper, scene)
+        return self._driver.action(goal, self._gripper, qpos, share, squeeze)
 
     def _lead(self, scene: Scene) -> Floats | float:
         """Return how far beyond its goal an arm is driven, so that its weight does not hold it off.

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from objects.solids import part_poses
-from robot_layouts.kinematics.rotations import Floats, multiply
+from robot_layouts.experts.grips import Grip, role_grip
+from robot_layouts.kinematics.rotations import Floats, multiply, quaternion_of, rotate
 from robot_layouts.simulation import State
 from robot_layouts.simulation.world import WorldBody
 from robots.gripper_motion import gripper_turn
@@ -33,6 +35,7 @@ class Scene:
         """Look at the first world of a task as it is now."""
         self._state: State = task.simulation.read()
         self._layout = task.standing()
+        self._grip_of: Callable[[str], Grip | None] = partial(role_grip, task)
         world = task.simulation.worlds[0]
         self.design: Any = world.design
         self.bodies: tuple[WorldBody, ...] = tuple(world.bodies.values())
@@ -66,11 +69,21 @@ class Scene:
         """Return the pose of a robot's tool centre point.
 
         Its z axis is the gripper's approach and its y axis the way the fingers open, if the robot's
-        TCP link has them so, as a Panda's; where the TCP is the mean of several links, always.
+        TCP link has them so, as a Panda's; where the TCP is the mean of several links, always. Of
+        jaws that swing as they close it is the middle of what their role is to hold; see
+        `robot_layouts.experts.grips.role_grip`.
         """
+        if (grip := self._grip_of(robot)) is not None:
+            return self._between_jaws(robot, grip)
         position, quaternion = _split(self._state.tcp_pose(robot)[0])
         turned = gripper_turn(self._layout.arm(robot).robot)
         return position, quaternion if turned is None else multiply(quaternion, turned)
+
+    def _between_jaws(self, robot: str, grip: Grip) -> Pose:
+        link = self._layout.arm(robot).robot.tcp_link
+        position, quaternion = _split(self._state.link_pose(robot, link)[0])
+        turned = multiply(quaternion, quaternion_of(grip.pose[:3, :3]))
+        return position + rotate(quaternion, grip.pose[:3, 3]), turned
 
     def in_world(self, pose: Pose) -> Pose:
         """Return a pose of this scene's frame, position and quaternion, in the world (m)."""

@@ -13,7 +13,8 @@ from math import pi, remainder
 import numpy as np
 
 from robot_layouts.experts.geometry import heading
-from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate
+from robot_layouts.experts.grips import role_grip
+from robot_layouts.kinematics.rotations import Floats, inverse, multiply, quaternion_of, rotate
 from robot_layouts.kinematics.solve import descend_by_differences
 from robot_layouts.simulation.backend import PointSolver, PoseSolver
 from robots import RobotDescriptor
@@ -34,7 +35,12 @@ class TipSolver:
     """
 
     def __init__(
-        self, robot: RobotDescriptor, reach: PointSolver, turned: Floats, base: Floats
+        self,
+        robot: RobotDescriptor,
+        reach: PointSolver,
+        turned: Floats,
+        base: Floats,
+        held: Floats | None = None,
     ) -> None:
         """Take a robot.
 
@@ -43,7 +49,9 @@ class TipSolver:
             reach: Its solver for points of its TCP link.
             turned: See `gripper_turn`.
             base: Where it stands, (3,) (m, world).
+            held: What is brought to a place instead of the TCP, in the TCP link's frame, (3,) (m).
         """
+        self._held = held
         self._robot, self._reach, self._turn, self._base = robot, reach, turned, base
         self._tree = gripper_tree(robot)
         places = [robot.joints.index(joint) for joint in reach.joints]
@@ -62,7 +70,9 @@ class TipSolver:
             qpos: All joints now, in the descriptor's order, (dof,) (rad, m).
         """
         arm, tip = self._reach.arm(qpos), np.array(self._robot.tcp_offset, float)
-        if self._robot.tcp_position_links:
+        if self._held is not None:
+            tip = self._held
+        elif self._robot.tcp_position_links:
             tip = tips(self._tree, self._robot, qpos).mean(0)
         found = (
             self._near(start, tip, position, quaternion)
@@ -104,17 +114,28 @@ class TipSolver:
 class TurnedSolver:
     """Finds arm joints that bring a gripper to a pose whose TCP link is turned otherwise."""
 
-    def __init__(self, solver: PoseSolver, turned: Floats) -> None:
-        """Take a solver for poses of the TCP link, and see `gripper_turn`."""
-        self._solver, self._back = solver, inverse(turned)
+    def __init__(self, solver: PoseSolver, turned: Floats, held: Floats) -> None:
+        """Take a robot.
+
+        Args:
+            solver: For poses of its TCP.
+            turned: See `gripper_turn`.
+            held: What is brought to a place instead of the TCP, from there, in the TCP link's
+                frame, (3,) (m).
+        """
+        self._solver, self._back, self._held = solver, inverse(turned), held
 
     def solve(self, position: Floats, quaternion: Floats, qpos: Floats) -> Floats | None:
         """Return arm joints near all joints ``qpos``, or None; see `TipSolver.solutions`."""
-        return self._solver.solve(position, multiply(quaternion, self._back), qpos)
+        return self._solver.solve(*self._tcp(position, quaternion), qpos)
 
     def solutions(self, position: Floats, quaternion: Floats, qpos: Floats) -> list[Floats]:
         """Return all that were found, the one with the shortest way first."""
-        return self._solver.solutions(position, multiply(quaternion, self._back), qpos)
+        return self._solver.solutions(*self._tcp(position, quaternion), qpos)
+
+    def _tcp(self, position: Floats, quaternion: Floats) -> tuple[Floats, Floats]:
+        link = multiply(quaternion, self._back)
+        return position - rotate(link, self._held), link
 
 
 def pose_solver(task: TaskEnv, robot: str) -> PoseSolver | TipSolver | TurnedSolver:
@@ -125,10 +146,17 @@ def pose_solver(task: TaskEnv, robot: str) -> PoseSolver | TipSolver | TurnedSol
         robot: Its name in the layout.
     """
     arm, backend = task.layout.arm(robot), task.simulation.backend
-    descriptor, turned = arm.robot, gripper_turn(arm.robot)
+    descriptor, turned, held = arm.robot, gripper_turn(arm.robot), None
+    if (grip := role_grip(task, robot)) is not None:
+        turned, held = quaternion_of(grip.pose[:3, :3]), grip.pose[:3, 3]
     few = len(descriptor.arm_joints) < _JOINTS
     if few or (turned is not None and descriptor.tcp_position_links):
         base, turn = np.array(arm.base_position), IDENTITY if turned is None else turned
-        return TipSolver(descriptor, backend.point_reach(robot), np.array(turn), base)
+        reach = backend.point_reach(robot)
+        return TipSolver(descriptor, reach, np.array(turn), base, held)
     solver = backend.inverse_kinematics(robot)
-    return solver if turned is None else TurnedSolver(solver, turned)
+    if turned is None:
+        return solver
+    return TurnedSolver(
+        solver, turned, np.zeros(3) if held is None else held - descriptor.tcp_offset
+    )

@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 from layouts import Layout
+from layouts.standing import held_widths
 from robot_layouts.simulation import Camera
 from robots import LayoutError, MissingPackageError, RobotDescriptor, TaskError
 from tasks.engine.scenario import Scenario
@@ -45,7 +46,7 @@ def fitted(task_class: type[Task], layout: Layout) -> dict[str, Any]:
     Raises:
         TaskError: If no place is in reach of both arms.
     """
-    held = max((need.opening or 0.0 for need in task_class.needs.values()), default=0.0)
+    held = held_widths(task_class, task_class.layout.places)
     fit = fit_to(layout, task_class.layout, held, task_class.table.outline(layout))
     if fit.as_declared:
         return {}

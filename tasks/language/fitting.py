@@ -7,7 +7,7 @@ lies between them, how it is turned, and by which factor it is larger.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 
 import numpy as np
@@ -17,7 +17,7 @@ from layouts import Layout
 from layouts.distances import farther
 from layouts.frames import Rectangle
 from layouts.placement import Placement
-from layouts.shared_place import shared_place
+from layouts.shared_place import shared_place, working_reaches
 from robot_layouts.simulation.framed import AS_DECLARED, Fit
 from robots import DescriptorError, RobotDescriptor, TaskError
 from robots.gripper_motion import gripper_motion
@@ -29,7 +29,9 @@ _LARGEST, _SMALLEST = 3.0, 0.05
 _DIGITS = 3  # of places and turns: bases are rounded, too
 
 
-def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | None = None) -> Fit:
+def fit_to(
+    layout: Layout, declared: Layout, held: Mapping[str, float], table: Rectangle | None = None
+) -> Fit:
     """Return how a declaration fits other robots, or others' places.
 
     It is turned as the arms are about their middle, and as much larger as the one that reaches
@@ -40,7 +42,8 @@ def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | Non
     Args:
         layout: The robots that are to do the task.
         declared: The task's own layout.
-        held: Width of the widest body that they hold, as declared (m).
+        held: Width of the widest body that each of them holds, as declared, by place (m); those
+            that hold none are left out.
         table: Outline of the table, x_min, y_min, x_max, y_max (m).
 
     Raises:
@@ -51,11 +54,14 @@ def fit_to(layout: Layout, declared: Layout, held: float, table: Rectangle | Non
     own = [declared.arm(place) for place in declared.places]
     if all(_alike(*pair) for pair in zip(arms, own, strict=True)):
         return AS_DECLARED
-    scale = min(a.robot.reach for a in arms) / min(a.robot.reach for a in own)
+    both, places = (layout, declared), declared.places
+    reaches, own_reaches = (working_reaches(each, places, held) for each in both)
+    scale = min(reaches) / min(own_reaches)
     if held:
-        scale = min([scale, *(_holds(arm.robot) / held for arm in arms if _opening(arm.robot))])
+        widest = max(held.values())
+        scale = min([scale, *(_holds(arm.robot) / widest for arm in arms if _opening(arm.robot))])
     turn = _turn(own, arms)
-    (x, y), room = _origin(own, arms, turn, scale), inf
+    (x, y), room = _origin(own, arms, farther(reaches, own_reaches), turn, scale), inf
     if len(arms) <= 2:  # more of them need not all reach it
         bodies = {layout.owner(place) for place in declared.places}
         near = (x, y) if len(bodies) == len(arms) else None  # limbs reach where their body has them
@@ -80,14 +86,17 @@ def _turn(own: Sequence[Placement], arms: Sequence[Placement]) -> float:
 
 
 def _origin(
-    own: Sequence[Placement], arms: Sequence[Placement], turn: float, scale: float
+    own: Sequence[Placement],
+    arms: Sequence[Placement],
+    factors: Sequence[float],
+    turn: float,
+    scale: float,
 ) -> tuple[float, float]:
     """Return where the origin of a declaration is by where arms stand (m).
 
-    They stand about the middle of the task's own as much farther as is usual, and what is declared
-    there stays there.
+    They stand about the middle of the task's own as much farther as factors say, and what is
+    declared there stays there.
     """
-    factors = farther([arm.robot for arm in arms], [arm.robot for arm in own])
     declared = np.mean(_flat(own))
     middle = np.mean(_flat(arms) - np.array(factors) * np.exp(1j * turn) * (_flat(own) - declared))
     at = middle - scale * np.exp(1j * turn) * declared

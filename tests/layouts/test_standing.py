@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement, around_table, at_task, face_to_face, ring, single
+from layouts.shared_place import SHARES_DOWN, working_reaches
 from robots import AssetError, LayoutError, RobotRegistry, UnknownNameError
 from robots.assets.locator import UrdfLocator
 
@@ -46,6 +47,34 @@ def test_what_the_roles_do_is_in_reach_of_the_one_that_reaches_least():
     distances = {name: abs(complex(*p.base_position[:2])) for name, p in placed.items()}
     assert distances["far"] == pytest.approx(distances["near"])
     assert distances["near"] == pytest.approx(0.8 * 0.48 / 0.855, abs=1e-3)
+
+
+def test_an_arm_that_holds_things_stands_where_it_reaches_them_with_its_gripper_down():
+    """An SO-101 reaches 0.48 m, but only about two thirds of that far down to the ground."""
+    three = ring(dict.fromkeys(("a", "b", "c"), "panda"), radius=1.5)
+    placed = at_task({"a": "so101"}, three, holding=["a"])
+    share = 0.65 * 0.48 / (0.9 * 0.855)
+    assert abs(complex(*placed["a"].base_position[:2])) == pytest.approx(1.5 * share, abs=1e-3)
+    assert placed["b"] == three["b"]
+
+
+def test_arms_that_would_start_inside_each_other_draw_their_hands_back():
+    small = dict.fromkeys(("a", "b", "c"), "so101")
+    three = ring(dict.fromkeys(small, "panda"), radius=0.75)
+    placed = at_task(small, three, holding=list(small))
+    share = 0.65 * 0.48 / (0.9 * 0.855)
+    assert abs(complex(*placed["a"].base_position[:2])) == pytest.approx(0.75 * share, abs=1e-3)
+    assert placed["a"].qpos is not None
+    assert not [f for f in placed.validate(workspaces=False).findings if f.serious]
+
+
+def test_how_far_robots_of_tasks_reach_down_is_as_their_files_say(monkeypatch):
+    known = dict(SHARES_DOWN)
+    monkeypatch.setattr("layouts.shared_place.SHARES_DOWN", {})
+    for robot, share in known.items():
+        layout = single({"arm": robot})
+        assert working_reaches(layout, ["arm"], ["arm"]) == [share * layout["arm"].robot.reach]
+        assert working_reaches(layout, ["arm"], []) == [layout["arm"].robot.reach]
 
 
 def test_the_arms_of_one_body_serve_the_roles_called_like_them(ready):
