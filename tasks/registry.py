@@ -32,6 +32,7 @@ CATALOGUE = {
     "CellCarryBeam-v1": "tasks.cells.carry_beam:CellCarryBeam",
     "CellCloseDrawers-v1": "tasks.cells.close_drawers:CellCloseDrawers",
     "CellCrossOver-v1": "tasks.cells.cross_over:CellCrossOver",
+    "CellFillDrawer-v1": "tasks.cells.fill_drawer:CellFillDrawer",
     "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",
     "CellHoldAndPush-v1": "tasks.cells.hold_and_push:CellHoldAndPush",
     "CellLiftBoard-v1": "tasks.cells.lift_board:CellLiftBoard",

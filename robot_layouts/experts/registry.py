@@ -28,6 +28,7 @@ CATALOGUE = {
     "CellCarryBeam-v1": "robot_layouts.experts.cells.carry_beam:carry_beam",
     "CellCloseDrawers-v1": "robot_layouts.experts.cells.close_drawers:close_drawers",
     "CellCrossOver-v1": "robot_layouts.experts.cells.cross_over:cross_over",
+    "CellFillDrawer-v1": "robot_layouts.experts.cells.fill_drawer:fill_drawer",
     "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
     "CellHoldAndPush-v1": "robot_layouts.experts.cells.hold_and_push:hold_and_push",
     "CellLiftBoard-v1": "robot_layouts.experts.cells.lift_board:lift_board",

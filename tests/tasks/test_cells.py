@@ -160,3 +160,24 @@ def test_raked_blocks_belong_in_the_box_of_their_side(first: int, second: int, s
         info = put(env, **inside)
         assert info["are_near"].item()
         assert info["success"].item() is solved
+
+
+@pytest.mark.parametrize(
+    ("out", "beside", "stages"),
+    [
+        (0.15, 0.0, [True, True, False]),
+        (0.0, 0.0, [False, True, True]),
+        (0.0, 0.3, [False, False, False]),
+    ],
+)
+def test_a_drawer_is_filled_once_it_is_shut_over_the_cube(
+    out: float, beside: float, stages: list[bool]
+):
+    with closing(tasks.make("CellFillDrawer-v1")) as env:
+        env.reset(seed=0)
+        world = env.simulation.worlds[0]
+        x, y, _ = env.state.position("case.drawer")[0].tolist()
+        world.set_joints("case", drawer=out)  # towards the opener, along -y
+        world.set_pose("cube", (x + beside, y - out, 0.05))
+        info = env.task.evaluate(env.simulation.read())
+        assert [info[flag].item() for flag in ("is_open", "is_inside", "success")] == stages
