@@ -15,7 +15,7 @@ from tasks import CellTask
 from tasks.cells.press_in_order import order_of
 from tasks.cells.take_sides import SIDES
 from tasks.language.fitting import AS_DECLARED
-from tests.tasks.own import put
+from tests.tasks.own import look, put
 
 ARMS = ("first", "second", "third")
 RING: Any = SimpleNamespace(
@@ -181,3 +181,38 @@ def test_a_drawer_is_filled_once_it_is_shut_over_the_cube(
         world.set_pose("cube", (x + beside, y - out, 0.05))
         info = env.task.evaluate(env.simulation.read())
         assert [info[flag].item() for flag in ("is_open", "is_inside", "success")] == stages
+
+
+def test_the_button_counts_only_while_the_lever_is_thrown():
+    with closing(tasks.make("CellUnlock-v1")) as env:
+        env.reset(seed=0)
+        world, found = env.simulation.worlds[0], []
+        for lever, cap in ((-0.3, 0.008), (0.9, 0.0), (0.9, 0.008)):
+            world.set_joints("lock", lever=lever)
+            world.set_joints("button", cap=cap)
+            found.append(look(env)["success"].item())
+        assert found == [False, False, True]
+
+
+def test_a_press_starts_when_both_buttons_are_pressed_and_the_loader_is_clear():
+    with closing(tasks.make("CellTwoHandPress-v1")) as env:
+        env.reset(seed=0)
+        world, found = env.simulation.worlds[0], []
+        x, y, z = env.state.tcp_position("loader")[0].tolist()
+        for place in ((0.0, 0.0, 0.025), (x, y, z)):
+            world.set_pose("die", place)
+            world.set_pose("block", place)
+            for left, right in ((0.006, 0.0), (0.0, 0.006), (0.006, 0.006)):
+                world.set_joints("control", left=left, right=right)
+                found.append(look(env)["success"].item())
+        assert found == [False, False, True, False, False, False]
+
+
+def test_latches_count_over_a_lid_that_is_shut():
+    with closing(tasks.make("CellShutSuitcase-v1")) as env:
+        env.reset(seed=0)
+        world, found = env.simulation.worlds[0], []
+        for lid, right in ((1.7, 0.0), (0.0, 0.044), (0.0, 0.0)):
+            world.set_joints("case", lid=lid, left=0.0, right=right)
+            found.append(look(env)["success"].item())
+        assert found == [False, False, True]

@@ -96,6 +96,7 @@ def advance(
     strokes: int = 12,
     back: float = 0.06,
     beside: Sequence[str] = (),
+    after: Sequence[str] = (),
 ) -> tuple[Waypoint, ...]:
     """Return the waypoints with which a tip pushes something straight until no way is left.
 
@@ -111,6 +112,7 @@ def advance(
         strokes: In how many parts; before each, what is left is looked at anew.
         back: How far the tip goes back in the end (m).
         beside: Other arms that push the same in step.
+        after: Waypoints of other arms that come before the tip comes down.
     """
     lean = {"leans": UPRIGHT, "farther": SLANTED}
     go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
@@ -135,7 +137,7 @@ def advance(
 
     return (
         go(f"above {body}", partial(at, up=HIGH), near=0.05),
-        go(f"at {body}", partial(at, up=0.0), near=0.03),
+        go(f"at {body}", partial(at, up=0.0), near=0.03, after=tuple(after)),
         *map(step, range(strokes)),
         go(f"back {body}", partial(along, stroke=strokes), near=0.05),
     )
@@ -160,7 +162,7 @@ def sweep(
         body: What is swept along.
         path: Given the scene and a share of the path, from 0 to 1, where the tip is then, (3,) (m).
         count: In how many parts.
-        after: Waypoints of other arms that come before.
+        after: Waypoints of other arms that come before the tip comes down.
     """
     lean = {"leans": UPRIGHT, "farther": SLANTED}
     go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
@@ -168,13 +170,11 @@ def sweep(
     def above(scene: Scene) -> Floats:
         return path(scene, 0.0) + np.array([0.0, 0.0, HIGH])
 
-    return (
-        go(f"above {body}", above, near=0.05, after=tuple(after)),
-        *(
-            go(f"sweep {body} {i}", partial(path, share=i / count), near=0.06)
-            for i in range(count + 1)
-        ),
-    )
+    def step(number: int) -> Waypoint:
+        place, waits = partial(path, share=number / count), () if number else tuple(after)
+        return go(f"sweep {body} {number}", place, near=0.06, after=waits)
+
+    return (go(f"above {body}", above, near=0.05), *map(step, range(count + 1)))
 
 
 def press_down(
