@@ -181,3 +181,19 @@ def test_a_drawer_is_filled_once_it_is_shut_over_the_cube(
         world.set_pose("cube", (x + beside, y - out, 0.05))
         info = env.task.evaluate(env.simulation.read())
         assert [info[flag].item() for flag in ("is_open", "is_inside", "success")] == stages
+
+
+@pytest.mark.parametrize(
+    ("place", "reached"),
+    [
+        ("corner", [True, False, False]),
+        ("end", [False, True, False]),
+        ("box", [False, False, True]),
+    ],
+)
+def test_a_block_is_passed_on_by_corner_and_end_into_the_box(place: str, reached: list[bool]):
+    with closing(tasks.make("CellRelay-v1")) as env:
+        env.reset(seed=0)
+        x, y, _ = env.state.position(place)[0].tolist()
+        info = put(env, block=(x, y, 0.025))
+        assert [info[flag].item() for flag in ("is_at_corner", "is_at_end", "success")] == reached
