@@ -49,6 +49,7 @@ CATALOGUE = {
     "CellPutAway-v1": "tasks.cells.put_away:CellPutAway",
     "CellRaiseFrame-v1": "tasks.cells.raise_frame:CellRaiseFrame",
     "CellRakeAndPlace-v1": "tasks.cells.rake_and_place:CellRakeAndPlace",
+    "CellRelay-v1": "tasks.cells.relay:CellRelay",
     "CellRunPlant-v1": "tasks.cells.run_plant:CellRunPlant",
     "CellServe-v1": "tasks.cells.serve:CellServe",
     "CellSetFaders-v1": "tasks.cells.set_faders:CellSetFaders",

@@ -45,6 +45,7 @@ CATALOGUE = {
     "CellPutAway-v1": "robot_layouts.experts.cells.put_away:put_away",
     "CellRaiseFrame-v1": "robot_layouts.experts.cells.raise_frame:raise_frame",
     "CellRakeAndPlace-v1": "robot_layouts.experts.cells.rake_and_place:rake_and_place",
+    "CellRelay-v1": "robot_layouts.experts.cells.relay:relay",
     "CellRunPlant-v1": "robot_layouts.experts.cells.run_plant:run_plant",
     "CellServe-v1": "robot_layouts.experts.cells.serve:serve",
     "CellSetFaders-v1": "robot_layouts.experts.cells.set_faders:set_faders",

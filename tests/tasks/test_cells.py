@@ -216,3 +216,19 @@ def test_latches_count_over_a_lid_that_is_shut():
             world.set_joints("case", lid=lid, left=0.0, right=right)
             found.append(look(env)["success"].item())
         assert found == [False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("place", "reached"),
+    [
+        ("corner", [True, False, False]),
+        ("end", [False, True, False]),
+        ("box", [False, False, True]),
+    ],
+)
+def test_a_block_is_passed_on_by_corner_and_end_into_the_box(place: str, reached: list[bool]):
+    with closing(tasks.make("CellRelay-v1")) as env:
+        env.reset(seed=0)
+        x, y, _ = env.state.position(place)[0].tolist()
+        info = put(env, block=(x, y, 0.025))
+        assert [info[flag].item() for flag in ("is_at_corner", "is_at_end", "success")] == reached
