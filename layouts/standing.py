@@ -7,13 +7,12 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from operator import lt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from layouts.distances import SHOULDER, farther, is_known_arm
 from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
-from layouts.validation.findings import Finding
 from robot_layouts.core.quoting import shown
 from robot_layouts.kinematics.quaternions import forward, yaw_quaternion
 from robots import (
@@ -23,6 +22,9 @@ from robots import (
     RobotDescriptor,
     UnknownNameError,
 )
+
+if TYPE_CHECKING:
+    from layouts.validation.findings import Finding
 
 # Shares of a reach at which what is worked on lies ahead. A Panda of ManiSkill stands 0.615 m, or
 # 0.72 of its reach, behind the middle of its table; two arms of one body reach over all of it.

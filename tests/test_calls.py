@@ -21,7 +21,7 @@ MOST = {
     "step": 130,
     "plan": 12_500,
     "search": 73_000,
-    "from_urdf": 10_500,
+    "from_urdf": 10_700,
 }
 
 
