@@ -29,10 +29,8 @@ if TYPE_CHECKING:
 # Shares of a reach at which what is worked on lies ahead. A Panda of ManiSkill stands 0.615 m, or
 # 0.72 of its reach, behind the middle of its table; two arms of one body reach over all of it.
 ALONE, BODY = 0.72, 0.6
-FARTHEST, NOISES = (
-    1.5,
-    20,
-)  # times as far from the middle; draws of joint noise in which none collide
+FARTHEST = 1.5  # times as far from the middle, where robots would collide as they start
+NOISES = 20  # draws of joint noise in which they are not to
 Point = tuple[float, float]
 
 NAME = "robot"  # of the place of one robot that serves all roles
