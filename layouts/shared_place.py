@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Collection, Container, Iterable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from math import sqrt
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts.arrangement import Arrangement
-from layouts.distances import in_catalogue
+from layouts.distances import farther, in_catalogue
 from layouts.frames import Rectangle
 from layouts.placement import Placement
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
@@ -85,6 +85,32 @@ def shared_place(
         found = deep[np.argmin(np.hypot(*(low + (deep + 0.5) * cell - near).T))]
     x, y = (low + (found + 0.5) * cell).tolist()
     return (x, y), float(depths[tuple(found)])
+
+
+def working_factors(
+    layout: Arrangement, own: Arrangement, places: Collection[str], holding: Container[str]
+) -> tuple[float, list[float]]:
+    """Return by which factor what arms do is larger than for a task's own, and how far they stand.
+
+    By their reach, and no more than by how far they get with their grippers down if they hold
+    things.
+
+    Args:
+        layout: The robots.
+        own: The task's own.
+        places: The arms, by their places.
+        holding: The places whose robots hold things.
+
+    Returns:
+        How much larger it is, and for each arm how much farther from the middle it stands; see
+        `layouts.distances.farther`.
+    """
+    scales, distances = list[float](), list[list[float]]()
+    for held in ((), holding):
+        reaches, usual = (working_reaches(each, places, held) for each in (layout, own))
+        scales.append(min(reaches) / min(usual))
+        distances.append(farther(reaches, usual))
+    return min(scales), [min(pair) for pair in zip(*distances, strict=True)]
 
 
 def working_reaches(

@@ -9,7 +9,7 @@ from dataclasses import replace
 from operator import lt
 from typing import TYPE_CHECKING, Any
 
-from layouts.distances import SHOULDER, farther, is_known_arm
+from layouts.distances import SHOULDER, is_known_arm
 from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
@@ -83,7 +83,7 @@ def at_task(
             outline = table.outline(layout) if table is not None else None
             return Layout({NAME: _body(robot, layout, outline)}, layout.frames)
         robots = dict.fromkeys(layout, robot)
-    from layouts.shared_place import working_reaches
+    from layouts.shared_place import working_factors
 
     loaded = load_robots(robots)
     for place in loaded:
@@ -92,9 +92,9 @@ def at_task(
     middle = _middle(layout)
     holding = held_widths(task, layout) if holding is None else holding
     places = {place: _with(at, loaded.get(place, at.robot)) for place, at in layout.items()}
-    both = Layout(places, layout.frames), layout
-    factors = farther(*(working_reaches(each, layout, holding) for each in both))
-    by_reach = farther(*(working_reaches(each, layout, ()) for each in both))
+    after = Layout(places, layout.frames)
+    _, factors = working_factors(after, layout, [*layout], holding)
+    _, by_reach = working_factors(after, layout, [*layout], ())
 
     def placed(share: float) -> Layout:
         moved = {

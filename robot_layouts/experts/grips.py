@@ -76,11 +76,11 @@ def role_grip(task: TaskEnv, robot: str) -> Grip | None:
     if held is None or not _may_swing(arm):
         return None
     limb, whole = task.layout.arm_name(robot).removeprefix(owner), task.layout[owner].robot
-    width, simulator = held * task.task.fit.scale, task.scenario.simulator
+    width, simulator = round(held * task.task.fit.scale, 6), task.scenario.simulator
     if not swings(gripper_motion(arm), width):
         return None
     grips = (
-        grip_of(whole, limb, width, depth, 1.0, simulator, wider=(wide,))
+        grip_of(whole, limb, width, depth, 1.0, simulator, (wide,))
         for wide, depth in product(ROOMY, MIDDLE_DEPTHS)
     )
     return next((grip for grip in grips if grip is not None), None)
@@ -95,6 +95,7 @@ def _may_swing(robot: RobotDescriptor) -> bool:
     return bool(motion.angles.max() >= PARALLEL)
 
 
+@lru_cache(maxsize=64)
 def grip_of(
     robot: RobotDescriptor,
     limb: str,
@@ -102,7 +103,6 @@ def grip_of(
     depth: float,
     firmness: float,
     simulator: str,
-    *,
     wider: tuple[float, ...] = WIDER,
 ) -> Grip | None:
     """Return how a gripper holds a cube, as it was seen to in physics; None if it does not.
@@ -120,19 +120,6 @@ def grip_of(
     Raises:
         RobotLayoutsError: If the robot cannot be built.
     """
-    return _tried(robot, limb, round(side, 6), depth, firmness, simulator, wider)
-
-
-@lru_cache(maxsize=64)
-def _tried(
-    robot: RobotDescriptor,
-    limb: str,
-    side: float,
-    depth: float,
-    firmness: float,
-    simulator: str,
-    wider: tuple[float, ...],
-) -> Grip | None:
     layout = single({NAME: robot})
     own, closing = layout.arm(NAME + limb).robot, Closing(layout, NAME + limb, side, simulator)
     motion, tree = gripper_motion(own), link_tree(robot)

@@ -120,7 +120,7 @@ class Hand:
         Raises:
             RobotLayoutsError: If the robot cannot be built.
         """
-        return grip_of(self._robot, self._limb, side, depth, firmness, self._simulator)
+        return grip_of(self._robot, self._limb, round(side, 6), depth, firmness, self._simulator)
 
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
-from layouts.distances import farther
 from layouts.frames import Rectangle
 from layouts.placement import Placement
-from layouts.shared_place import shared_place, working_reaches
+from layouts.shared_place import shared_place, working_factors
 from robot_layouts.simulation.framed import AS_DECLARED, Fit
 from robots import DescriptorError, RobotDescriptor, TaskError
 from robots.gripper_motion import gripper_motion
@@ -54,14 +53,12 @@ def fit_to(
     own = [declared.arm(place) for place in declared.places]
     if all(_alike(*pair) for pair in zip(arms, own, strict=True)):
         return AS_DECLARED
-    both, places = (layout, declared), declared.places
-    reaches, own_reaches = (working_reaches(each, places, held) for each in both)
-    scale = min(reaches) / min(own_reaches)
+    scale, factors = working_factors(layout, declared, declared.places, held)
     if held:
         widest = max(held.values())
         scale = min([scale, *(_holds(arm.robot) / widest for arm in arms if _opening(arm.robot))])
     turn = _turn(own, arms)
-    (x, y), room = _origin(own, arms, farther(reaches, own_reaches), turn, scale), inf
+    (x, y), room = _origin(own, arms, factors, turn, scale), inf
     if len(arms) <= 2:  # more of them need not all reach it
         bodies = {layout.owner(place) for place in declared.places}
         near = (x, y) if len(bodies) == len(arms) else None  # limbs reach where their body has them

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 import tasks
+from robot_layouts.experts import find_expert
 from robot_layouts.experts.framed import FramedScene
 from robot_layouts.experts.grips import role_grip
 from robot_layouts.experts.hands import Hand
 from robot_layouts.experts.script import Scene
 from robot_layouts.experts.tips import pose_solver
+from tasks.episode import play
 
 PLACES = ("first", "second", "third")
 SORT = "CellSortCubes-v1"
@@ -57,3 +59,12 @@ def test_scripts_bring_the_middle_of_what_is_held_to_places(small):
     assert found is not None
     qpos[Hand(small, "first").columns] = found
     assert held_at(small, "first", qpos) == pytest.approx(place, abs=3e-3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("cell", [SORT, "CellSortByWord-v1"])
+def test_cubes_are_sorted_by_arms_with_one_jaw_that_swings(cell: str):
+    robots = dict.fromkeys(tasks.get_task_class(cell).layout, "so101")
+    env = tasks.make(cell, robots=robots, obs_mode="none")
+    plan = find_expert(cell)(env, 0)
+    assert play(env, 0, plan).solved, plan.reason

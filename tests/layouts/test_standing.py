@@ -58,6 +58,12 @@ def test_an_arm_that_holds_things_stands_where_it_reaches_them_with_its_gripper_
     assert placed["b"] == three["b"]
 
 
+def test_a_larger_arm_that_holds_things_stands_no_farther_while_the_other_one_stays():
+    """A Panda gets less far with its gripper down than it reaches, and its neighbour holds none."""
+    layout = at_task({"left": "fetch"}, TWO, holding=["left"])
+    assert layout["left"].base_position[:2] == TWO["left"].base_position[:2]
+
+
 def test_arms_that_would_start_inside_each_other_draw_their_hands_back():
     small = dict.fromkeys(("a", "b", "c"), "so101")
     three = ring(dict.fromkeys(small, "panda"), radius=0.75)
