@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from benchmarks.agreement import agreement
 from benchmarks.bench.run import bench, tables
 from benchmarks.cells import cells
 from benchmarks.collisions import collisions
@@ -47,6 +48,7 @@ PROGRAM = Program(
             objects,
             engines,
             device,
+            agreement,
             experts,
             skills,
             conversions,

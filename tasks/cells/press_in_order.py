@@ -23,6 +23,9 @@ def order_of(phrasing: int) -> tuple[str, ...]:
     return tuple(ARMS[(phrasing + step * number) % len(ARMS)] for number in range(len(ARMS)))
 
 
+TURNS = {arm: tuple(float(order_of(i).index(arm)) for i in range(len(ARMS))) for arm in ARMS}
+
+
 @register_task("CellPressInOrder-v1")
 class CellPressInOrder(CellTask):
     """Press all buttons in the order that the instruction tells; pressing too early starts over.
@@ -53,7 +56,7 @@ class CellPressInOrder(CellTask):
 
     def remember(self, state: State) -> dict[str, Array]:
         """How many buttons were pressed in their order so far."""
-        return {"pressed": state.array([0.0] * len(self.phrasings))}
+        return {"pressed": state.full(0.0)}
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all were pressed, one after the other."""
@@ -77,5 +80,4 @@ class CellPressInOrder(CellTask):
 
     def _turns(self, state: State) -> list[Floats]:
         """Return by arm how many come before it, (N,)."""
-        orders = [order_of(number) for number in self.phrasings]
-        return [state.array([float(order.index(arm)) for order in orders]) for arm in self.arms]
+        return [self.told(state, TURNS[arm]) for arm in self.arms]

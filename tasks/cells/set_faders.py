@@ -64,7 +64,7 @@ class CellSetFaders(CellTask):
         return [*self._tips(state), *self._off(state)]
 
     def _off(self, state: State) -> list[Floats]:
-        wanted = state.array([SETTINGS[k % len(SETTINGS)] for k in self.phrasings]) * STEP
+        wanted = self.told(state, SETTINGS) * STEP
         faders = [state.joint(f"fader_{arm}", "cap") for arm in self.arms]
         off: Any = [abs(fader - wanted[:, i]) for i, fader in enumerate(faders)]
         return off

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from itertools import product
 from math import atan2, cos, pi, sin
-from typing import Any
 
 from layouts import ring
 from tasks import (
@@ -26,6 +25,7 @@ from tasks.maths import Array, Floats
 
 HALF, PAD, THICK, OUT = 0.02, 0.07, 0.004, 0.375  # half edges, half a pad's height, its place (m)
 CHOICES = tuple(product(("left", "right"), repeat=3))
+RIGHT = tuple(tuple(float(side == "right") for side in choice) for choice in CHOICES)
 PHRASES = (
     "Lay the red cube on the {} pad of its arm, the green one on the {}, the blue one on the {}.",
     "Red goes {}, green {} and blue {}.",
@@ -82,11 +82,9 @@ class CellSortByWord(CellTask):
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their pads."""
-        ways = list[Floats]()
+        told, ways = self.told(state, RIGHT), list[Floats]()
         for i, arm in enumerate(self.arms):
-            choices = [CHOICES[number % len(CHOICES)][i] for number in self.phrasings]
-            right: Any = state.array([float(choice == "right") for choice in choices])
             to_right = state.planar_distance(f"cube_{arm}", f"pad_{arm}")
             to_left = state.planar_distance(f"cube_{arm}", f"pad_{self.arms[i - 1]}")
-            ways.append(right * to_right + (1.0 - right) * to_left)
+            ways.append(told[:, i] * to_right + (1.0 - told[:, i]) * to_left)
         return ways

@@ -23,7 +23,9 @@ from tasks.maths import Array, Floats, norm
 
 HALF, NEAR = 0.02, 0.025  # of cubes, and of a cube from its place in the tower (m)
 SLOW = 0.03  # of cubes that rest (m/s); in a tower they tremble at half of that
-ORDERS = tuple(permutations(("red", "green", "blue")))  # from the bottom up
+COLOURS = ("red", "green", "blue")
+ORDERS = tuple(permutations(COLOURS))  # from the bottom up
+HEIGHTS = {arm: tuple(HALF * (2 * o.index(arm) + 1) for o in ORDERS) for arm in COLOURS}
 PHRASES = (
     "Stack the cubes: {} at the bottom, then {}, {} on top.",
     "Build a tower on the mark, from the bottom up {}, {} and {}.",
@@ -75,10 +77,9 @@ class CellStackInOrder(CellTask):
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their places in the tower."""
         mark = state.position("mark")
-        orders = [ORDERS[number % len(ORDERS)] for number in self.phrasings]
         up: Any = state.array((0.0, 0.0, 1.0))
         ways = list[Floats]()
         for arm in self.arms:
-            heights = state.array([[HALF * (2 * order.index(arm) + 1)] for order in orders])
-            ways.append(norm(mark + heights * up - state.position(f"cube_{arm}")))
+            height = self.told(state, HEIGHTS[arm])[:, None]
+            ways.append(norm(mark + height * up - state.position(f"cube_{arm}")))
         return ways

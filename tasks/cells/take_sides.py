@@ -23,6 +23,7 @@ PHRASES = (
 )
 L, R = "left", "right"
 SIDES = ((L, R, R, L), (R, R, L, L), (R, L, R, R), (L, L, R, R), (R, L, L, R))
+LEFT = tuple(tuple(float(side == L) for side in sides) for sides in SIDES)
 HALF, RADIUS, OUT, ASIDE = 0.025, 0.09, 0.36, 0.14  # of blocks, and of marks (m)
 
 
@@ -66,13 +67,10 @@ class CellTakeSides(CellTask):
 
     def ways(self, state: State) -> list[Floats]:
         """Of the blocks to their marks."""
-        told = [SIDES[number % len(SIDES)] for number in self.phrasings]
-        return [
-            self._left(state, arm, [sides[i] for sides in told]) for i, arm in enumerate(self.arms)
-        ]
-
-    def _left(self, state: State, arm: str, sides: list[str]) -> Floats:
-        """Return how far a block is from its mark, (N,) (m), by the side of each episode."""
-        left = state.array([float(side == L) for side in sides])[:, None]
-        mark = left * state.position(f"left_{arm}") + (1.0 - left) * state.position(f"right_{arm}")
-        return norm((state.position(f"block_{arm}") - mark)[:, :2])
+        told, ways = self.told(state, LEFT), list[Floats]()
+        for i, arm in enumerate(self.arms):
+            left = told[:, i : i + 1]
+            one, other = state.position(f"left_{arm}"), state.position(f"right_{arm}")
+            mark = left * one + (1.0 - left) * other
+            ways.append(norm((state.position(f"block_{arm}") - mark)[:, :2]))
+        return ways

@@ -9,6 +9,8 @@ from tasks import CellTask, EpisodeRandom, Object, State, World, register_task, 
 from tasks.maths import Array, Floats, maximum, norm
 
 PAIRS = (("red", "blue"), ("green", "white"), ("white", "red"), ("blue", "green"))
+ARMS = ("red", "green", "blue", "white")
+NAMED = {arm: tuple(float(arm in pair) for pair in PAIRS) for arm in ARMS}
 PHRASES = (
     "Throw the levers of the arms {} and {}, and leave the others.",
     "Only {} and {} throw their levers.",
@@ -70,8 +72,7 @@ class CellThrowLevers(CellTask):
 
     def _named(self, state: State) -> list[Floats]:
         """Return by arm whether it is named, (N,) of 0 and 1."""
-        pairs = [PAIRS[number % len(PAIRS)] for number in self.phrasings]
-        return [state.array([float(arm in pair) for pair in pairs]) for arm in self.arms]
+        return [self.told(state, NAMED[arm]) for arm in self.arms]
 
     def _left(self, state: State) -> list[Floats]:
         """Return by arm how far its lever is from where it should be (rad)."""

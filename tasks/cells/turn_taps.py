@@ -67,7 +67,7 @@ class CellTurnTaps(CellTask):
         return [*self._tips(state), *(ARM * off for off in self._off(state))]
 
     def _off(self, state: State) -> list[Floats]:
-        wanted = state.array([SETTINGS[k % len(SETTINGS)] for k in self.phrasings]) * NOTCH
+        wanted = self.told(state, SETTINGS) * NOTCH
         taps = [state.joint(f"tap_{arm}", "handle") for arm in self.arms]
         off: Any = [abs(tap - wanted[:, i]) for i, tap in enumerate(taps)]
         return off

@@ -103,9 +103,19 @@ class CellTask(MultiRobotTask):
         world.set_pose(body, (x, y, thing.height), turn)
 
     @property
-    def phrasings(self) -> list[int]:
-        """Which of its instructions each environment's episode has, one number each."""
-        return [rng.phrasing(len(self.instruction)) for rng in self._rngs]
+    def phrasings(self) -> Any:
+        """Which of its instructions each environment's episode has, (N,) whole numbers."""
+        return self._chosen_phrasings(len(self.instruction))
+
+    def told(self, state: State, table: tuple[Any, ...]) -> Any:
+        """Return what the episodes' instructions stand for, (N, …).
+
+        Args:
+            state: The state.
+            table: What each choice stands for, a number or a tuple of numbers. The instructions
+                are one phrase with every choice after the other.
+        """
+        return state.array(table)[self.phrasings % len(table)]
 
     @property
     def arms(self) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -48,7 +49,7 @@ from tasks.engine.remade import Remade
 from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario
 from tasks.engine.task import Info, Memory, Task
 from tasks.engine.touch import Touch, touch_links
-from tasks.language.randomness import EpisodeRandom
+from tasks.language.randomness import EpisodeRandom, phrasings
 from tasks.language.stages import PassedStages
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
 from tasks.randomization.distractors import add_distractors, area_of
@@ -179,7 +180,12 @@ class TaskEnv(Remade):
         task.memory = Memory()
         self._expect_returns(task_class.__name__)
         self._randomizer: Randomizer | None = None
-        vars(task).update(_rngs=self._rngs, _elapsed=self._elapsed, _randomizer=None)
+        vars(task).update(
+            _rngs=self._rngs,
+            _chosen_phrasings=partial(phrasings, self._rngs),
+            _elapsed=self._elapsed,
+            _randomizer=None,
+        )
         self._simulation: Simulation | None = Simulation(
             self.layout,
             self._build_world,
@@ -565,8 +571,7 @@ class TaskEnv(Remade):
         if self._progress is not None:
             info |= self._progress.told(info)
         if len(self._phrasings):
-            numbers = [rng.phrasing(len(self._phrasings)) for rng in self._rngs]
-            info[INSTRUCTION] = self._phrasings[numbers]
+            info[INSTRUCTION] = self._phrasings[phrasings(self._rngs, len(self._phrasings))]
         return info
 
     def _with_touch(self, parts: Mapping[str, Array], state: State) -> dict[str, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -131,6 +131,7 @@ class Task:
     memory: Memory
     _randomizer: Randomizer | None
     _rngs: Sequence[EpisodeRandom]
+    _chosen_phrasings: Callable[[int], Any]
     _elapsed: NDArray[np.int32]
 
     task_id: ClassVar[str] = ""

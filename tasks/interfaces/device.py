@@ -30,6 +30,7 @@ from tasks.registry import get_task_class, make_scenario
 STARTS = 1024
 VARIED = ("bases", "damping", "friction", "mass", "spread", "stiffness")  # axes of randomization
 DIVERGED, OVERFLOWED = "diverged", "overflowed"  # in info
+PHRASING = "phrasing"  # in info: which of a task's instructions an episode has
 
 
 class _Given(NamedTuple):
@@ -56,7 +57,8 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
     the task itself, and kept on the device; each episode has one of them, chosen there by a
     counter-based generator of the environment's seed and the number of the episode. Only the
     episode of a seed that `reset` is given has that seed's own start. ``info["seed"]`` is the seed
-    whose start it is: ``tasks.make(…, simulator="mujoco").reset(seed=…)`` begins alike.
+    whose start it is: ``tasks.make(…, simulator="mujoco").reset(seed=…)`` begins alike. Of tasks
+    with several instructions, ``info["phrasing"]`` tells which each has, (N,).
 
     An environment whose physics diverges is truncated, with an observation and a reward of 0, and
     flagged in ``info["diverged"]``; ``info["overflowed"]`` flags those in which contacts were left
@@ -126,6 +128,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         self._starts = self._draw(self.seeds).without_constants(self._world.as_built)
         self._simulation = DeviceSimulation(host.simulation, self._starts, count, contacts=contacts)
         self._elapsed = torch.zeros(count, dtype=torch.int32, device=on)
+        self._started = started = torch.zeros(count, dtype=torch.int64, device=on)  # of which seed
         self.task = task = object.__new__(cls)
         vars(task).update(vars(host.task))
         vars(task).update(
@@ -134,6 +137,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             moving=range(count),
             memory=Memory(),
             _rngs=_NoStreams(cls.__name__),
+            _chosen_phrasings=started.remainder,
             _elapsed=self._elapsed,
             _randomizer=None,
         )
@@ -144,7 +148,6 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         self._seeds = torch.arange(count, device=on) + secrets.randbelow(2**32 - count)
         self._episodes = torch.full_like(self._seeds, -1)
         self._passed = torch.zeros_like(self._seeds)
-        self._started = torch.zeros_like(self._seeds)  # with the start of which seed
         self._nowhere = torch.zeros(count, dtype=torch.bool, device=on)
         self._over = self._nowhere
         self._ungiven = _Given(self._starts, self._nowhere, self._started, self._started)
@@ -262,7 +265,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         self._episodes = (self._episodes + where).masked_fill(given, 0)
         row = chosen(self._seeds, self._episodes, len(self.seeds))
         begun = torch.where(given, own, self.seeds[0] + row)
-        self._started = torch.where(where, begun, self._started)
+        self._started.copy_(torch.where(where, begun, self._started))
         self._simulation.begin(where, starts.take(torch.where(given, rows, row)))
         self._elapsed.masked_fill_(where, 0)
         self._passed.masked_fill_(where, 0)
@@ -294,13 +297,15 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
                 self._passed += (self._passed == number) & flag
             self._passed.masked_fill_(flags[-1], len(flags))
             info |= {STAGE: self._passed.clone(), STAGE_SCORE: self._scores[self._passed]}
+        if isinstance(said := self.task.instruction, tuple):
+            info[PHRASING] = self._started % len(said)
         finite = state.all_poses.isfinite().all(-1).all(0) & state.joint_velocities.isfinite().all(
             1
         )
         return info | {
             DIVERGED: ~finite,
             OVERFLOWED: self._simulation.bodies.overflowed,
-            SEED: self._started,
+            SEED: self._started.clone(),
             SUCCESS: info[SOLVED],
         }
 
@@ -381,8 +386,8 @@ class _NoStreams:
 
     def __iter__(self) -> Iterator[NoReturn]:
         raise TaskError(
-            f"{self._task} asks for each environment's random stream, or for which instruction it"
-            " has, after its episode has begun; simulator 'mujoco_warp' has none then"
+            f"{self._task} asks for each environment's random stream after its episode has begun;"
+            " simulator 'mujoco_warp' has none then"
         )
 
 

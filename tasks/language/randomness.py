@@ -16,6 +16,11 @@ from robots import TaskError
 from tasks.randomization.distributions import Stream
 
 
+def phrasings(streams: Sequence[EpisodeRandom], count: int) -> NDArray[np.int64]:
+    """Return which of so many instructions the present episodes have, one number a stream."""
+    return np.array([stream.phrasing(count) for stream in streams], np.int64)
+
+
 class FirstSeeds:
     """Seeds for the first episodes of environments that are not given a seed.
 

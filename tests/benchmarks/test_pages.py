@@ -32,6 +32,7 @@ COMMANDS = {
     "experts": ["experts", "--tasks"],
     "cells_robots": ["cells", "--tasks"],
     "engines": ["engines", "--tasks"],
+    "device": ["agreement", "--tasks"],
     "conversions": ["conversions", "--modes", "--tasks", "PickCube-v1"],
     "processors": ["processors", "--render"],
     "imitation": ["imitation"],

@@ -46,7 +46,7 @@ def test_the_instruction_says_what_counts_and_the_observation_does_not():
     env = tasks.make("CellThrowLevers-v1", num_envs=2)
     info = env.reset(seed=3)[1]  # environment i has seed 3 + i
     task: Any = env.task
-    assert task.phrasings == [3, 4]
+    assert task.phrasings.tolist() == [3, 4]
     named = dict(zip(task.arms, task._named(env.state), strict=True))
     for i, words in enumerate(info["instruction"]):
         assert [arm for arm in task.arms if arm in words] == [a for a in task.arms if named[a][i]]

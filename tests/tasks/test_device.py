@@ -25,9 +25,7 @@ APART = 1e-4  # rad, m: how far float32 may be from MuJoCo's float64
 # At 1, drives of Pandas are at their limit of force to the last bit, on either side of it.
 SHORT = np.float32(0.99)
 OBSERVED = 2e-3  # of observations, which have speeds in them (rad/s)
-BY_WORD = ("PressInOrder", "SetFaders", "SortByWord", "StackInOrder", "TakeSides", "ThrowLevers")
 REFUSED = {
-    **{f"Cell{name}-v1": "which instruction" for name in (*BY_WORD, "TurnTaps")},
     "DrawTriangle-v1": "one by one",
     "PegInsertionSide-v1": "geometry changes",
 }
@@ -254,6 +252,50 @@ def test_control_modes_are_those_of_mujoco(engine, mode):
             obs, *_ = env.step(action)
             seen, *_ = host.step(action)
             torch.testing.assert_close(obs, seen, atol=OBSERVED, rtol=0)
+
+
+@pytest.mark.long
+def test_each_world_has_the_instruction_of_its_seed(engine):
+    task = "CellThrowLevers-v1"
+    told = tasks.get_task_class(task).instruction
+    with closing(made("DISABLED", task=task)) as env:
+        host = tasks.make(task, 3, simulator="mujoco")
+        with closing(host):
+            _, info = env.reset(seed=[1, 6, 11])
+            _, said = host.reset(seed=[1, 6, 11])
+            assert [told[i] for i in info["phrasing"].tolist()] == said["instruction"].tolist()
+            idle = torch.zeros(env.action_space.shape)
+            _, reward, *_ = env.step(idle)
+            _, earned, *_ = host.step(idle)
+            torch.testing.assert_close(reward, earned, atol=APART, rtol=0)
+            assert reward.unique().numel() == 3
+        _, info = env.reset(
+            seed=[2, None, None], options={"reset_mask": np.array([True, False, False])}
+        )
+        assert info["phrasing"].tolist() == [2, 6, 11]
+
+
+@pytest.mark.long
+def test_memory_grows_with_the_number_of_worlds_and_no_faster(engine):
+    import warp
+
+    def taken(count):
+        with closing(made(num_envs=count, task="PickCube-v1")) as env:
+            env.reset(seed=0)
+            env.step(torch.zeros(env.action_space.shape))
+            data = env.task.simulation.bodies._data
+            held = [part for own in (data, data.contact, data.efc) for part in vars(own).values()]
+            arrays = {id(part): part for part in held if isinstance(part, warp.array)}
+            tensors = [part for part in gc.get_objects() if isinstance(part, torch.Tensor)]
+            own = {
+                part.untyped_storage().data_ptr(): part for part in tensors if count in part.shape
+            }
+            kernels = sum(part.capacity for part in arrays.values())
+            return kernels, sum(part.untyped_storage().nbytes() for part in own.values())
+
+    (few, seen_few), (more, seen_more), (most, seen_most) = map(taken, (61, 122, 244))
+    assert most - more == 2 * (more - few) > 0
+    assert seen_most - seen_more <= 2.1 * (seen_more - seen_few)
 
 
 # -- every task -----------------------------------------------------------------------------------
