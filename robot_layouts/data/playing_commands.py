@@ -275,6 +275,7 @@ def verify(
     from robot_layouts.core.progress import Progress
     from robot_layouts.data.receipts import verification
     from robot_layouts.data.receipts.pictures import pictures_folder
+    from robot_layouts.data.receipts.provenance import episode_of
     from robot_layouts.data.receipts.receipt import Receipt
 
     read = Receipt.read(receipt)
@@ -283,13 +284,13 @@ def verify(
         known = dict.fromkeys(read.making["layout"], known)
     total = min(len(read.episodes), episodes or len(read.episodes))
     executor, line = players.executor(), Progress(total, "episodes")
-    states = {episode.seed: episode.states for episode in read.episodes}
+    recorded = {episode.seed: episode for episode in read.episodes}
     equal = Counter[bool]()
 
     def show(event: Event) -> None:
         tell(line, event)
         if event.seed is not None and event.result is not None:
-            equal[event.result.trace.states == states[event.seed]] += 1
+            equal[episode_of(event.seed, event.result) == recorded[event.seed]] += 1
         played = equal.total()
         line.update(played, f"verifying, {equal[True]} of {played} equal")
 

@@ -13,6 +13,7 @@ import pytest
 import torch
 
 from robot_layouts.__main__ import main
+from robot_layouts.core.progress import Progress
 from robot_layouts.data.receipts import EpisodeReceipt, Receipt, ReceiptError
 from robot_layouts.data.receipts.verification import first_step
 from robots import LocalUrdf, RobotDescriptor, RobotRegistry
@@ -259,6 +260,14 @@ def test_versions_and_processors_are_named_and_do_not_count(copy, part, name, va
     printed = capsys.readouterr().out
     assert f"\nnot as in the receipt:\n  {about}" in printed
     assert len(printed.splitlines()) == 4
+
+
+def test_progress_counts_episodes_that_are_equal_in_everything(copy, monkeypatch):
+    said = []
+    monkeypatch.setattr(Progress, "update", lambda line, done, text: said.append(text))
+    edit(copy, lambda found: found["episodes"][2].update(total=0.5))
+    assert main(["verify", str(copy), "--workers=0", f"--policy={NAMED}"]) == 1
+    assert said[-1] == "verifying, 2 of 3 equal"
 
 
 @pytest.mark.parametrize(

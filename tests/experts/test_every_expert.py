@@ -26,6 +26,7 @@ OF_50 = {
     "PushT-v1": 45,
     "RollBall-v1": 48,
 }
+FEWER = {"DrawTriangle-v1": 20, "PushT-v1": 20}  # of these seeds, as each takes seconds
 FAILURES_OF_10 = {"PickCubeSO100-v1": 2}  # 0 of the others
 EXPERTS = list_experts()
 CLONED = [name for name in EXPERTS if name in tasks.list_clones()]
@@ -56,8 +57,9 @@ def test_its_rehearsal_is_what_its_actions_do_again(name: str, seed: int):
 @pytest.mark.long
 @pytest.mark.parametrize("name", OF_50)
 def test_it_solves_most_of_50_seeds(name: str):
-    failed = [seed for seed in range(50) if not episode(name, seed).solved]
-    assert len(failed) <= 50 - OF_50[name], f"failed: {failed}"
+    count = FEWER.get(name, 50)
+    failed = [seed for seed in range(count) if not episode(name, seed).solved]
+    assert len(failed) <= (50 - OF_50[name]) * count / 50, f"failed: {failed}"
 
 
 @pytest.mark.long

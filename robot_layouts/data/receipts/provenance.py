@@ -227,12 +227,13 @@ def receipt_of(
     return Receipt(
         **described,
         environment={**first, **{name: value for name, value in more.items() if value}},
-        episodes=tuple(_episode(seed, score) for seed, score in traced.items()),
+        episodes=tuple(episode_of(seed, score) for seed, score in traced.items()),
         pictures={} if job.pictures is None else {"interval": job.pictures.interval},
     )
 
 
-def _episode(seed: int, score: TracedScore) -> EpisodeReceipt:
+def episode_of(seed: int, score: TracedScore) -> EpisodeReceipt:
+    """Return what a receipt says of an episode that was played."""
     return EpisodeReceipt(
         seed,
         score.success,
