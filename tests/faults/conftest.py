@@ -49,6 +49,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
                 area, what, promise = said["fault"]
                 happened = said.get("happened", _last_line(report))
                 tried[area].append((what, promise, happened, outcome == "passed"))
+    if not tried:  # a run that was stopped, or of none of them: the page stays
+        return
     for path, page in ((counts, _totals(tried)), (everything, f"{_totals(tried)}{_list(tried)}")):
         if path:
             Path(path).parent.mkdir(parents=True, exist_ok=True)
