@@ -22,6 +22,8 @@ TCP_ERROR = 0.002  # m
 WITH_TCP = ("manipulator", "humanoid", "unknown")  # kinds of robots that bring it somewhere
 MISSED = 0.03  # of the overlaps that checks see; what physics may not see
 EXACT = 1e-9  # m; how far MuJoCo and ours may be apart
+TIPS = 0.005  # m; how far a TCP may be from where the fingers meet
+HANDED_OVER = 8  # of ten episodes
 NEAR = 0.02  # m; how far a TCP that no frame marks may be from where it is expected
 
 STAGES = (
@@ -34,6 +36,9 @@ STAGES = (
     "agreement",
     "to_urdf",
     "to_drake",
+    "grasps",
+    "tcp_control",
+    "hand_over",
 )
 QUESTIONS: Mapping[str, str] = {
     "loads": "loads",
@@ -52,6 +57,12 @@ QUESTIONS: Mapping[str, str] = {
     "agreement": "checks as physics",
     "to_urdf": "URDF",
     "to_drake": "Drake",
+    "fingers": "fingers known",
+    "between": "TCP between the tips",
+    "grasps": "grasps a cube",
+    "square": "TCP's square",
+    "hand_over": "hand-over by two",
+    "two_hands": "hand-over by one body",
     "no_raw": "no raw exception",
     "no_crash": "no crash",
 }
@@ -185,6 +196,7 @@ def judge(seen: Seen, expected: Expected) -> dict[str, Answer]:
     came = _yes(error is not None and error < TCP_ERROR, length)
     answers["tcp_move"] = came if expected.kind in WITH_TCP else NOT_ASKED
     answers["agreement"] = _agreement(seen.get("agreement", {}))
+    answers |= _work(seen, expected)
     return {question: answers[question] for question in QUESTIONS}
 
 
@@ -204,6 +216,37 @@ def judge_mjcf(seen: Seen, expected: Expected) -> dict[str, Answer]:
     return {question: found[question] for question in MJCF_QUESTIONS}
 
 
+def _work(seen: Seen, expected: Expected) -> dict[str, Answer]:
+    """Answer for fingers, grasps, control of the TCP and the hand-over."""
+    hands = [arm for arm in expected.arms.values() if arm.gripper]
+    grippers = seen.get("grasps", {}).get("grippers", ())
+    known = [one for one in grippers if one["fingers"]]
+    count = max(len(hands), len(grippers))
+    off = max((one["tcp_off"] for one in known), default=0.0)
+    length = f"{off * 1e3:.0f} mm off" if off < 1 else ""
+    held = sum(one["grasps"] for one in known)
+    handed = seen.get("hand_over", {})
+    text = f"{handed['solved']} of {handed['of']}" if "of" in handed else ""
+    passed = _yes(handed.get("solved", 0) >= HANDED_OVER, text) if known else NOT_ASKED
+    return {
+        "fingers": _yes(len(known) == count, f"{len(known)} of {count}") if count else NOT_ASKED,
+        "between": _yes(off < TIPS, length) if known else NOT_ASKED,
+        "grasps": _yes(held == count, f"{held} of {count}") if count else NOT_ASKED,
+        "square": _square(seen.get("tcp_control", {}), expected),
+        "hand_over": passed if len(known) == 1 else NOT_ASKED,
+        "two_hands": passed if len(known) > 1 else NOT_ASKED,
+    }
+
+
+def _square(seen: Seen, expected: Expected) -> Answer:
+    """Answer for the control modes that steer TCPs: what they missed, but for what they report."""
+    trials = seen.get("trials", ())
+    if not expected.arms or expected.kind not in WITH_TCP or ("trials" in seen and not trials):
+        return NOT_ASKED
+    missed = max((max(t["drift"], t["corner"] - t["reported"]) for t in trials), default=1.0)
+    return _yes(missed < TCP_ERROR, f"{missed * 1e3:.1f} mm" if missed < 1 else "no")
+
+
 def reason(seen: Seen) -> str:
     """Return why something is not as it should be: the first reason, or nothing."""
     if "ended" in seen:
@@ -212,7 +255,16 @@ def reason(seen: Seen) -> str:
         for kind in ("raw", "refused"):
             if kind in seen.get(stage, {}):
                 return f"{stage}: {seen[stage][kind]}"
-    problems = seen.get("trial", {}).get("problems") or seen.get("alone", {}).get("why")
+    problems = [
+        *(seen.get("trial", {}).get("problems") or seen.get("alone", {}).get("why") or ()),
+        *(one["problem"] for one in seen.get("grasps", {}).get("grippers", ()) if one["problem"]),
+        *(
+            one["problem"]
+            for one in seen.get("tcp_control", {}).get("trials", ())
+            if one["problem"]
+        ),
+        *(f"hand-over: {why}" for why in seen.get("hand_over", {}).get("why", ())),
+    ]
     return str(problems[0]) if problems else ""
 
 

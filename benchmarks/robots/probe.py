@@ -12,6 +12,7 @@ import resource
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,12 +23,15 @@ import yaml
 from layouts import Layout, Placement, face_to_face, side_by_side, single
 from layouts.validation.collisions import nearest
 from layouts.validation.collisions import stand as stand_hulls
+from robot_layouts.experts import find_expert
 from robot_layouts.kinematics.rotations import Floats, inverse_pose
 from robot_layouts.simulation import PhysicsSettings
+from robot_layouts.simulation.checks.grasp import try_grasps
 from robot_layouts.simulation.checks.overlaps import empty, stand
+from robot_layouts.simulation.checks.tcp_control import try_tcp_control
 from robot_layouts.simulation.checks.trial import tcp_error, try_robot
 from robot_layouts.simulation.simulation import Simulation
-from robots import RobotDescriptor, RobotLayoutsError
+from robots import RobotDescriptor, RobotLayoutsError, TaskError
 from robots.bodies.hulls import RobotModel, load_model
 from robots.bodies.overlaps import overlapping
 from robots.from_urdf import guess_descriptor
@@ -38,6 +42,8 @@ from robots.mjcf.robot import find_robot
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from robots.urdf.tree import kinematic_tree
+from tasks import make
+from tasks.episode import play
 
 MEMORY = 8 << 30  # bytes of this process
 STEPS = 500
@@ -46,6 +52,8 @@ POSTURES = {"overlaps": 200, "kinematics": 100}  # random ones
 TOUCH = 1e-3  # m; overlaps that are less deep do not count
 TIMESTEP = 1e-5  # s, in which nothing moves
 WIDEST = 3.0  # rad or m from 0
+HAND_OVER = "TwoRobotHandOver-v1"
+SEEDS, SOLVED = 10, 8  # episodes of it, and how many are to be solved
 NAME = "robot"
 
 Seen = dict[str, Any]
@@ -116,6 +124,71 @@ def _trial(robot: RobotDescriptor) -> Seen:
         "wrong_numbers": [n.number.name for n in seen.numbers if n.problem is not None],
         "problems": list(seen.problems[:4]),
     }
+
+
+def _grasps(robot: RobotDescriptor) -> Seen:
+    """Close every gripper on a cube in physics, and shake it."""
+    return {
+        "grippers": [
+            {
+                "fingers": seen.fingers is not None,
+                "tcp_off": _rounded(seen.tcp_off),
+                "grasps": seen.grasps,
+                "problem": seen.problem,
+            }
+            for seen in try_grasps(robot)
+        ]
+    }
+
+
+def _tcp_control(robot: RobotDescriptor) -> Seen:
+    """Hold every TCP, and send it along a square, in each mode that steers it."""
+    trials = list(try_tcp_control(robot)) if robot.arm_joints else []
+    return {
+        "trials": [
+            {
+                "arm": seen.arm,
+                "mode": seen.mode,
+                "drift": _rounded(seen.drift),
+                "corner": _rounded(seen.corner),
+                "reported": _rounded(seen.reported),
+                "problem": seen.problem,
+            }
+            for seen in trials
+        ]
+    }
+
+
+def _hand_over(robot: RobotDescriptor) -> Seen:
+    """Let the expert hand a cube over, from one of two such robots to the other, or on one body.
+
+    Seeds are played until it is known whether 8 of 10 are solved.
+    """
+    alone = single({NAME: robot})
+    hands = [arm for arm in alone.places if alone.arm(arm).robot.fingers is not None]
+    if not hands:
+        return {"hands": 0}
+    if len(hands) > 1:
+        task = make(HAND_OVER, robots=robot, obs_mode="none")
+    else:
+        layout = face_to_face({"left": robot, "right": robot})
+        task = make(HAND_OVER, layout=layout, obs_mode="none")
+    solved, why = 0, list[str]()
+    expert = find_expert(HAND_OVER)
+    with closing(task):
+        for seed in range(SEEDS):
+            try:
+                plan = expert(task, seed)
+            except TaskError as error:
+                why.append(str(error))
+            else:
+                if play(task, seed, plan).solved:
+                    solved += 1
+                else:
+                    why.append(plan.reason)
+            if solved == SOLVED or len(why) > SEEDS - SOLVED:
+                break
+    return {"hands": len(hands), "solved": solved, "of": solved + len(why), "why": why[:1]}
 
 
 def _exported_urdf(robot: RobotDescriptor) -> Seen:
@@ -253,6 +326,9 @@ LOOKS: Looks = {
     "agreement": _agreement,
     "to_urdf": _exported_urdf,
     "to_drake": _exported_drake,
+    "grasps": _grasps,
+    "tcp_control": _tcp_control,
+    "hand_over": _hand_over,
 }
 
 

@@ -19,6 +19,9 @@ from robots.urdf.tree import kinematic_tree, rest_poses
 
 POSTURES = 200  # random ones, in which overlaps are looked for
 ALWAYS = 0.95  # of them; what MoveIt's setup assistant takes for always
+# The same for a link and what the link after next carries: where a hull fills a hollow in which the
+# joint between them turns, as at a Baxter's shoulders, they overlap wherever the arm really goes.
+MOSTLY = 2 / 3
 PARALLEL = 0.999  # cosine; of slides that are one telescope
 MARGIN = 0.05  # m; more than the distance from which PhysX looks at a pair
 
@@ -91,7 +94,8 @@ def always_overlapping(
 ) -> frozenset[LinkPair]:
     """Return the pairs of links that overlap in all, or nearly all, of `POSTURES` random postures.
 
-    The postures are the same every time. Joints that mimic another follow it.
+    For links that two joints in a row join, most of them are enough. The postures are the same
+    every time. Joints that mimic another follow it.
 
     Args:
         model: What a URDF describes.
@@ -105,15 +109,18 @@ def always_overlapping(
     driven = [joint for joint in model.moving if joint.mimics is None]
     tree = kinematic_tree(model, [joint.name for joint in driven])
     hulls = read_hulls(model, urdf)
+    names = [tree.links[hull.link] for hull in hulls]
     waiting = np.array(counted_pairs(tree, hulls, besides), int).reshape(-1, 2)
     misses = np.zeros(len(waiting), int)
+    path = {name: [j.name for j in model.path_to(name) if j.moves] for name in set(names)}
+    chained = np.array([_two_in_a_row(path[names[a]], path[names[b]]) for a, b in waiting], bool)
+    most = (1 - np.where(chained, MOSTLY, ALWAYS)) * POSTURES
     low, high = np.array([joint.span for joint in driven]).reshape(-1, 2).T
     draws = np.random.default_rng(0).uniform(low, high, (POSTURES, len(driven)))
     for poses in tree.forward(draws):
         misses += ~overlapping(hulls, poses, waiting)
-        kept = misses <= (1 - ALWAYS) * POSTURES
-        waiting, misses = waiting[kept], misses[kept]
-    names = [tree.links[hull.link] for hull in hulls]
+        kept = misses <= most
+        waiting, misses, most = waiting[kept], misses[kept], most[kept]
     return frozenset(frozenset((names[a], names[b])) for a, b in waiting.tolist())
 
 
@@ -194,6 +201,17 @@ def _least_distance(
         points = corners[link] @ rest[link][:3, :3].T + rest[link][:3, 3]
         loose += float(np.linalg.norm(points - place, axis=1).max())
     return 2 * max(lengths, default=0.0) - sum(lengths) - loose
+
+
+def _two_in_a_row(one: Sequence[str], other: Sequence[str]) -> bool:
+    """Return whether one link is carried by another over two joints, by the joints that move each.
+
+    Args:
+        one: Those from the root to one link, by name.
+        other: Likewise to the other.
+    """
+    shorter, longer = sorted((one, other), key=len)
+    return len(longer) == len(shorter) + 2 and longer[:-2] == shorter
 
 
 def _moving_between(one: str, other: str, model: UrdfModel) -> list[ModelJoint]:

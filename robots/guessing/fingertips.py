@@ -60,17 +60,18 @@ class Fingertips:
 
     @property
     def are_jaws(self) -> bool:
-        """Whether there are two, and shapes tell where they are: so they meet in one place."""
-        return self.solid and len(self.ends) == 2
+        """Whether two sides meet in one place, and shapes tell where."""
+        return self.solid and (len(self.ends) == 2 or bool(self._two_fingers()))
 
     def middle(self) -> Floats:
         """Return the place between the tips, in the root's frame, (3,) (m).
 
-        Where one finger is called a thumb, that is half-way between it and the others.
+        Where one finger is called a thumb, that is half-way between it and the others; where two
+        fingers have several tips, half-way between those.
         """
         thumbs = [link for link in self.ends if self.is_thumb(link)]
         others = [link for link in self.ends if link not in thumbs]
-        groups = [group for group in (thumbs, others) if group]
+        groups = self._two_fingers() or [group for group in (thumbs, others) if group]
         means = [np.mean([self._tips[link] for link in group], axis=0) for group in groups]
         return np.mean(means, axis=0)
 
@@ -114,13 +115,23 @@ class Fingertips:
         return abs(float(way @ self._outwards(end)))
 
     def grasping(self) -> tuple[str, str] | None:
-        """Return the two ends that grasp, or a thumb and the finger that it meets."""
+        """Return the two ends that grasp, one of each finger, or a thumb and what it meets."""
         thumbs = [end for end in self.ends if self.is_thumb(end)]
         others = [end for end in self.ends if end not in thumbs]
         if not thumbs or not others:
-            return (self.ends[0], self.ends[1]) if len(self.ends) == 2 else None
+            ends = [finger[0] for finger in self._two_fingers()] or self.ends
+            return (ends[0], ends[1]) if len(ends) == 2 else None
         named = [[end for end in others if self.is_called(end, known)] for known in OPPOSITE]
         return thumbs[0], next((ends[0] for ends in named if ends), others[0])
+
+    def _two_fingers(self) -> list[list[str]]:
+        """Return the tips of each of two fingers, of which one has several; else nothing."""
+        if len(self.ends) < 3 or any(map(self.is_thumb, self.ends)):
+            return []
+        fingers: dict[str, list[str]] = {}
+        for end in self.ends:
+            fingers.setdefault(self.finger_of(end).name, []).append(end)
+        return list(fingers.values()) if len(fingers) == 2 else []
 
     def opening(self, ends: Sequence[str], postures: Sequence[Mapping[str, float]]) -> Floats:
         """Return which way two fingers open, in the frames of the links that touch, (2, 3).

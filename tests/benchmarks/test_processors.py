@@ -90,12 +90,12 @@ def test_a_receipt_of_pictures_is_verified_with_other_threads_but_not_without_av
     request = {"task": "PickCube-v1", "file": str(tmp_path / "a.json"), "workers": 0, "count": 1}
     found = {
         name: answers_under(ways()[name].setting, "benchmarks.receipts", request, 1)[0]
-        for name in ("as it was written", "two threads", "SSE")
+        for name in ("as it is", "two threads", "SSE")
     }
     pictures = (STEPS + 1) * 2  # by two cameras
     same = {"episodes": 1, "pictures": pictures, "equal": 1, "other_pictures": 0}
     assert found["two threads"] == same
-    assert found["as it was written"] == found["two threads"]
+    assert found["as it is"] == found["two threads"]
     assert found["SSE"]["equal"] == 0
 
 

@@ -147,6 +147,36 @@ class TestJudge:
         assert (answers["arm"].good, answers["arm"].text) == (False, arm_text)
         assert (answers["gripper"].good, answers["gripper"].text) == (False, gripper_text)
 
+    @pytest.mark.parametrize(
+        ("fingers", "question", "other"),
+        [([True], "hand_over", "two_hands"), ([True, True], "two_hands", "hand_over")],
+    )
+    def test_hands_that_work(self, fingers, question, other):
+        grippers = [
+            {"fingers": f, "tcp_off": 0.001, "grasps": True, "problem": None} for f in fingers
+        ]
+        trial = {"drift": 0.0, "corner": 0.03, "reported": 0.029, "problem": None}
+        seen = loaded(arm=(("l_1",), 1)) | {
+            "grasps": {"grippers": grippers},
+            "tcp_control": {"trials": [trial]},
+            "hand_over": {"hands": len(fingers), "solved": 8, "of": 9, "why": ["it fell"]},
+        }
+        hands = {str(i): ExpectedArm(("l_?",), ("lf_?",)) for i, _ in enumerate(fingers)}
+        expected = Expected(kind="manipulator", arms=hands)
+        answers = judge(seen, expected)
+        for asked in ("fingers", "between", "grasps", "square", question):
+            assert answers[asked].good, asked
+        assert answers[other].good is None
+        assert reason(seen) == "hand-over: it fell"
+
+        seen["hand_over"] |= {"solved": 6, "of": 9}
+        grippers[0] |= {"fingers": False, "tcp_off": 1e9, "grasps": False, "problem": "no fingers"}
+        trial["corner"] = 0.05
+        answers, count = judge(seen, expected), len(fingers)
+        assert answers["fingers"].text == answers["grasps"].text == f"{count - 1} of {count}"
+        assert answers["square"].text == "21.0 mm"
+        assert reason(seen) == "no fingers"
+
     def test_nothing_seen_is_nothing_good(self):
         answers = judge({"ended": "crashed: SIGSEGV"}, self.TWO)
         assert set(answers) == set(QUESTIONS)
@@ -201,5 +231,8 @@ def test_robots_of_mani_skill(tmp_path):
     expectations = read_expectations(EXPECTED)
     for key in ("mani_skill/panda/panda_v2.urdf", "mani_skill/xarm7/xarm7.urdf"):
         answers = judge(robots[key], expected_of(key, expectations))
-        for question in ("loads", "arm", "tcp", "reach", "tcp_move", "to_urdf", "to_drake"):
+        for question in ("loads", "arm", "tcp", "reach", "tcp_move", "square", "to_urdf"):
             assert answers[question].good, (key, question, robots[key])
+        works = key.endswith("panda_v2.urdf") or None  # xarm7.urdf has no gripper
+        for question in ("fingers", "between", "grasps", "hand_over"):
+            assert answers[question].good is works, (key, question, robots[key])

@@ -132,6 +132,22 @@ class TestGuess:
         assert always_overlapping(model, path, joined_pairs(model)) == {pair("base", "lower")}
         assert guess_allowed(model, path)[0] == (("base", "lower"),)
 
+    @pytest.mark.parametrize(("size", "allowed"), [(0.12, True), (0.08, False)])
+    def test_what_the_link_after_next_is_inside_most_of_the_time_may_be(
+        self, tmp_path, size, allowed
+    ):
+        """The third link is inside the first in three of four postures, or in half of them."""
+        text = urdf(
+            link("base", f'<box size="{size} {size} {size}"/>'),
+            link("upper", ""),
+            link("lower", '<box size="0.12 0.12 0.12"/>', xyz="0.1 0 0"),
+            joint("shoulder", "base", "upper", xyz="0.03 0 0"),
+            joint("elbow", "upper", "lower"),
+        )
+        arm = robot(tmp_path, text, ["shoulder", "elbow"], tcp="lower")
+        found = guess_allowed(*model_of(arm))[0]
+        assert found == ((("base", "lower"),) if allowed else ())
+
     def test_from_urdf_takes_it_or_what_is_given(self, stand):
         path = stand.urdf.locate()
         guessed = RobotDescriptor.from_urdf(path, quiet=True)

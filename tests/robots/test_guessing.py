@@ -388,6 +388,20 @@ class TestFingers:
         assert fingers.opening_signs == (-1, 1)
         assert fingers.opening_axes[0][2] > 0.9
 
+    def test_a_finger_with_two_tips_grasps_with_one_of_them(self, tmp_path):
+        """As a Talos has it: a broad finger with a tip at each end, and a narrow one."""
+        parts, last = single_arm(end="")
+        for finger, sign, tips in (("broad", 1, (-0.03, 0.03)), ("narrow", -1, (0.0,))):
+            turns = {"axis": f"0 {sign} 0", "limits": (0.0, 0.8)}
+            parts.link(finger, 0.02, "0.03 0.08 0.01", "0.015 0 0")
+            parts.joint(f"{finger}_root", last, finger, f"0.05 0 {0.03 * sign}", **turns)
+            for i, y in enumerate(tips):
+                tip = parts.link(f"{finger}_tip{i}", 0.01, "0.03 0.01 0.01", "0.015 0 0")
+                parts.joint(f"{tip}_joint", finger, tip, f"0.04 {y} 0", **turns)
+        robot = guess(parts, tmp_path).descriptor
+        assert robot.fingers.links == ("broad_tip0", "narrow_tip0")
+        assert robot.tcp_offset[1:] == pytest.approx((0.0, 0.0), abs=1e-3)
+
     def test_a_reason_says_how_fingers_are_given(self, tmp_path):
         parts, last = single_arm(end="")
         for i, y in enumerate((-0.03, 0.0, 0.03)):
