@@ -1,6 +1,7 @@
 """Receipts of policies that see, verified in processes that draw and compute in other ways.
 
-A process reads from stdin, as JSON, which receipt it is to verify; where that is not there yet, it
+They are kept in ``docs/receipts/pictures``, so that each machine verifies what others have seen. A
+process reads from stdin, as JSON, which receipt it is to verify; where that is not there yet, it
 writes it first. What a policy does here follows from all pixels, so that another one of them leads
 to other states.
 """
@@ -15,7 +16,6 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import product
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from benchmarks.asking import Setting, answers_under
+from benchmarks.records import DOCS
 from robot_layouts.core.portable import portable_variables
 from robot_layouts.data import evaluate
 from robot_layouts.data.playing.picture_digests import pictures_of
@@ -31,6 +32,7 @@ from robot_layouts.data.receipts.verification import verify
 from robots import SimulationError
 from robots.portable import numpy_versions
 
+FOLDER = DOCS / "receipts" / "pictures"
 EPISODES, STEPS, SIZE = 25, 20, 64  # of each cell, of an episode, pixels
 EMULATED = 2  # episodes that are verified on an emulated processor, where each takes minutes
 CAPS, THREADS = "GALLIUM_OVERRIDE_CPU_CAPS", "LP_NUM_THREADS"
@@ -84,7 +86,7 @@ class Way(NamedTuple):
 
 
 def ways() -> dict[str, Way]:
-    """Return all of them by name, all portable; the first one writes the receipt as well."""
+    """Return all of them by name, all portable; the first one writes a receipt that lacks."""
     portable = portable_variables(os.environ, numpy_versions())
 
     def way(
@@ -93,7 +95,7 @@ def ways() -> dict[str, Way]:
         return Way(Setting(about, {**portable, **variables}, emulated=emulated), workers)
 
     return {
-        "as it was written": way("by the process that wrote it"),
+        "as it is": way("a portable process here"),
         "one thread": way(f"`{THREADS}=1`", {THREADS: "1"}),
         "two threads": way(f"`{THREADS}=2`", {THREADS: "2"}),
         "1 worker": way("`--workers 1`", workers=1),
@@ -119,19 +121,26 @@ def verified(before: Mapping[str, Any], names: Collection[str]) -> dict[str, Any
         for name, way in known.items()
         if name == first or name in chosen
     }
-    with TemporaryDirectory() as folder:
-        for task, name in tqdm(list(product(CELLS, found)), disable=None):
-            way, file = known[name], f"{folder}/{task}.json"
-            count = EMULATED if way.setting.emulated else EPISODES
-            request = {"task": task, "file": file, "workers": way.workers, "count": count}
-            try:
-                (answer,) = answers_under(way.setting, "benchmarks.receipts", request, 1)
-            except SimulationError:  # the driver ends the process
-                answer = None
-            found[name]["cells"][task] = answer
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    for task, name in tqdm(list(product(CELLS, found)), disable=None):
+        way, file = known[name], str(FOLDER / f"{task}.json")
+        count = EMULATED if way.setting.emulated else EPISODES
+        request = {"task": task, "file": file, "workers": way.workers, "count": count}
+        try:
+            (answer,) = answers_under(way.setting, "benchmarks.receipts", request, 1)
+        except SimulationError:  # the driver ends the process
+            answer = None
+        found[name]["cells"][task] = answer
     every = {**before.get("ways", {}), **found}
     rows = {name: every[name] for name in known if name in every}
-    return {"episodes": EPISODES, "steps": STEPS, "size": SIZE, "ways": rows}
+    written = Receipt.read(FOLDER / f"{next(iter(CELLS))}.json").environment
+    return {
+        "episodes": EPISODES,
+        "steps": STEPS,
+        "size": SIZE,
+        "written_on": written["processor"]["name"],
+        "ways": rows,
+    }
 
 
 def _verify(task: str, file: str, workers: int, count: int) -> dict[str, int]:

@@ -185,7 +185,7 @@ def _hand_over(robot: RobotDescriptor) -> Seen:
                 if play(task, seed, plan).solved:
                     solved += 1
                 else:
-                    why.append(plan.reason)
+                    why.append(getattr(plan, "reason", ""))
             if solved == SOLVED or len(why) > SEEDS - SOLVED:
                 break
     return {"hands": len(hands), "solved": solved, "of": solved + len(why), "why": why[:1]}
