@@ -22,6 +22,7 @@ from robot_layouts.experts.tips import pose_solver
 from robot_layouts.kinematics.rotations import Floats, inverse, multiply, rotate
 from robot_layouts.simulation.world import part_name
 from robots import TaskError
+from robots.urdf.reading import model_of
 from tasks import TaskEnv
 
 Numbers = Sequence[float] | Floats
@@ -47,7 +48,7 @@ def need_fingers(task: TaskEnv, plan: str, *robots: str) -> None:
         robots: Their names in the layout.
 
     Raises:
-        TaskError: If one has no fingers.
+        TaskError: If one has no fingers, or some that nothing can touch.
     """
     for name in robots:
         robot = task.layout.arm(name).robot
@@ -57,6 +58,12 @@ def need_fingers(task: TaskEnv, plan: str, *robots: str) -> None:
                 f" {robot.name}, which has none (if two links of it grasp, its field"
                 " fingers=Fingers((LINK, LINK), opening_signs=(1, 1), opening_axes=(WAY, WAY)) says"
                 " so, with which way each opens in its own frame)"
+            )
+        solid = model_of(robot.urdf.locate()).collisions
+        if bare := [link for link in robot.fingers.links if link not in solid]:
+            raise TaskError(
+                f"{plan} needs fingers that touch; {' and '.join(bare)} of {name!r} go through what"
+                f" they close on: the URDF of {robot.name} gives them no <collision>"
             )
 
 

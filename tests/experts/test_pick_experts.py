@@ -1,5 +1,7 @@
 """The experts that pick, place and stack: how they grip, and what they refuse."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,15 @@ def test_an_arm_without_fingers_is_an_error(task_id, place):
     env = tasks.make(task_id, robots={place: "panda_stick"})
     with pytest.raises(TaskError, match=f"needs fingers on .*'{place}' is a panda_stick, which"):
         find_expert(task_id)(env, 0)
+
+
+def test_fingers_that_go_through_things_are_an_error():
+    panda = RobotRegistry.load("panda")
+    links = ("panda_leftfinger", "panda_hand_tcp")  # a frame, which has no shape
+    ghost = replace(panda, fingers=replace(panda.fingers, links=links))
+    env = tasks.make("PickCube-v1", robots={"arm": ghost})
+    with pytest.raises(TaskError, match="panda_hand_tcp of 'arm' go through .* no <collision>"):
+        find_expert("PickCube-v1")(env, 0)
 
 
 def test_jaws_that_do_not_roll_are_an_error():
