@@ -232,3 +232,42 @@ def test_a_block_is_passed_on_by_corner_and_end_into_the_box(place: str, reached
         x, y, _ = env.state.position(place)[0].tolist()
         info = put(env, block=(x, y, 0.025))
         assert [info[flag].item() for flag in ("is_at_corner", "is_at_end", "success")] == reached
+
+
+def test_cubes_go_round_on_the_turntable_and_belong_in_the_box_of_their_colour():
+    with closing(tasks.make("CellUnloadTurntable-v1")) as env:
+        env.reset(seed=0)
+        ahead, start = np.sign(-env.state.joint("turntable", "plate").item()), angles(env)
+        still = np.zeros(env.action_space.shape)
+        for _ in range(20):  # a second
+            env.step(still)
+        turned = ahead * (angles(env) - start) % (2 * np.pi)
+        assert turned == pytest.approx(np.full(3, turned[0]), abs=0.01)
+        assert 0.14 < turned[0] < 0.23
+        boxes = {
+            arm: (*env.state.position(f"box_{arm}")[0, :2].tolist(), 0.03)
+            for arm in env.layout.arms
+        }
+        own = {f"cube_{arm}": place for arm, place in boxes.items()}
+        swapped = own | {"cube_red": own["cube_blue"], "cube_blue": own["cube_red"]}
+        assert not put(env, **swapped)["are_two_in"].item()
+        assert put(env, **own)["success"].item()
+
+
+def angles(env: tasks.TaskEnv) -> np.ndarray:
+    """Return where the cubes are round the middle of the turntable (rad)."""
+    places = [env.state.position(f"cube_{arm}")[0].tolist() for arm in env.layout.arms]
+    return np.array([np.arctan2(y, x) for x, y, _ in places])
+
+
+def test_the_bar_counts_behind_a_gate_that_is_shut_again():
+    with closing(tasks.make("CellHoldGate-v1")) as env:
+        env.reset(seed=0)
+        world, found = env.simulation.worlds[0], []
+        x, y, _ = env.state.position("mark")[0].tolist()
+        for off, leaf in ((0.0, 1.4), (0.0, 0.05), (0.08, 0.05)):
+            world.set_pose("bar", (x, y + off, 0.02))
+            world.set_joints("gate", leaf=leaf)
+            info = look(env)
+            found.append([info[flag].item() for flag in ("is_open", "is_through", "success")])
+        assert found == [[True, True, False], [False, True, True], [False, True, False]]
