@@ -232,3 +232,15 @@ def test_a_block_is_passed_on_by_corner_and_end_into_the_box(place: str, reached
         x, y, _ = env.state.position(place)[0].tolist()
         info = put(env, block=(x, y, 0.025))
         assert [info[flag].item() for flag in ("is_at_corner", "is_at_end", "success")] == reached
+
+
+def test_brackets_count_once_they_hang_on_the_pegs_in_their_order():
+    with closing(tasks.make("CellHangBrackets-v1")) as env:
+        env.reset(seed=0)
+        x, y, z, *turned = env.state.pose("pegs")[0].tolist()
+        w, *_, s = turned
+        seats = [(x, y, z + 0.012 + 0.008 * i, *turned) for i in range(3)]
+        back = (*seats[1][:3], -s, 0.0, 0.0, w)  # half a turn on
+        assert not put(env, red=seats[1], blue=seats[0], bar=seats[2])["are_two_on"].item()
+        assert put(env, red=seats[0], blue=back)["are_two_on"].item()
+        assert put(env, red=seats[0], blue=back, bar=seats[2])["success"].item()
