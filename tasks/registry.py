@@ -34,6 +34,8 @@ CATALOGUE = {
     "CellCrossOver-v1": "tasks.cells.cross_over:CellCrossOver",
     "CellFillDrawer-v1": "tasks.cells.fill_drawer:CellFillDrawer",
     "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",
+    "CellHammerPegs-v1": "tasks.cells.hammer_pegs:CellHammerPegs",
+    "CellHangBrackets-v1": "tasks.cells.hang_brackets:CellHangBrackets",
     "CellHoldAndPush-v1": "tasks.cells.hold_and_push:CellHoldAndPush",
     "CellHoldGate-v1": "tasks.cells.hold_gate:CellHoldGate",
     "CellLiftBoard-v1": "tasks.cells.lift_board:CellLiftBoard",

@@ -30,6 +30,8 @@ CATALOGUE = {
     "CellCrossOver-v1": "robot_layouts.experts.cells.cross_over:cross_over",
     "CellFillDrawer-v1": "robot_layouts.experts.cells.fill_drawer:fill_drawer",
     "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
+    "CellHammerPegs-v1": "robot_layouts.experts.cells.hammer_pegs:hammer_pegs",
+    "CellHangBrackets-v1": "robot_layouts.experts.cells.hang_brackets:hang_brackets",
     "CellHoldAndPush-v1": "robot_layouts.experts.cells.hold_and_push:hold_and_push",
     "CellHoldGate-v1": "robot_layouts.experts.cells.hold_gate:hold_gate",
     "CellLiftBoard-v1": "robot_layouts.experts.cells.lift_board:lift_board",

@@ -271,3 +271,34 @@ def test_the_bar_counts_behind_a_gate_that_is_shut_again():
             info = look(env)
             found.append([info[flag].item() for flag in ("is_open", "is_through", "success")])
         assert found == [[True, True, False], [False, True, True], [False, True, False]]
+
+
+def test_brackets_count_once_they_hang_on_the_pegs_in_their_order():
+    with closing(tasks.make("CellHangBrackets-v1")) as env:
+        env.reset(seed=0)
+        x, y, z, *turned = env.state.pose("pegs")[0].tolist()
+        w, *_, s = turned
+        seats = [(x, y, z + 0.012 + 0.008 * i, *turned) for i in range(3)]
+        back = (*seats[1][:3], -s, 0.0, 0.0, w)  # half a turn on
+        assert not put(env, red=seats[1], blue=seats[0], bar=seats[2])["are_two_on"].item()
+        assert put(env, red=seats[0], blue=back)["are_two_on"].item()
+        assert put(env, red=seats[0], blue=back, bar=seats[2])["success"].item()
+
+
+def test_pegs_are_home_once_the_mallet_stands_on_its_mark_again():
+    with closing(tasks.make("CellHammerPegs-v1")) as env:
+        env.reset(seed=0)
+        world, found = env.simulation.worlds[0], []
+        x, y, _ = env.state.position("mark")[0].tolist()
+        for arm in env.layout.arms:
+            world.set_joints(f"block_{arm}", peg=0.026)
+        for third, mallet in (
+            (0.02, (x, y, 0.0)),
+            (0.026, (x + 0.07, y, 0.0)),
+            (0.026, (x, y, 0.03)),
+            (0.026, (x, y, 0.0)),
+        ):
+            world.set_joints("block_third", peg=third)
+            world.set_pose("mallet", mallet)
+            found.append(look(env)["success"].item())
+        assert found == [False, False, False, True]
