@@ -36,6 +36,7 @@ CATALOGUE = {
     "CellFillHeldBin-v1": "tasks.cells.fill_held_bin:CellFillHeldBin",
     "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",
     "CellHoldAndPush-v1": "tasks.cells.hold_and_push:CellHoldAndPush",
+    "CellInsertPegs-v1": "tasks.cells.insert_pegs:CellInsertPegs",
     "CellLiftBoard-v1": "tasks.cells.lift_board:CellLiftBoard",
     "CellLiftPot-v1": "tasks.cells.lift_pot:CellLiftPot",
     "CellLoadTray-v1": "tasks.cells.load_tray:CellLoadTray",

@@ -32,6 +32,7 @@ CATALOGUE = {
     "CellFillHeldBin-v1": "robot_layouts.experts.cells.fill_held_bin:fill_held_bin",
     "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
     "CellHoldAndPush-v1": "robot_layouts.experts.cells.hold_and_push:hold_and_push",
+    "CellInsertPegs-v1": "robot_layouts.experts.cells.insert_pegs:insert_pegs",
     "CellLiftBoard-v1": "robot_layouts.experts.cells.lift_board:lift_board",
     "CellLiftPot-v1": "robot_layouts.experts.cells.lift_pot:lift_pot",
     "CellLoadTray-v1": "robot_layouts.experts.cells.load_tray:load_tray",

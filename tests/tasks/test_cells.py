@@ -263,3 +263,20 @@ def test_a_box_is_filled_once_its_lid_is_shut_over_both_cubes():
             info = look(env)
             found.append([info[flag].item() for flag in ("is_open", "are_both_in", "success")])
         assert found == [[True, True, False], [False, True, True], [False, False, False]]
+
+
+def test_each_peg_counts_in_the_socket_of_its_own_side():
+    with closing(tasks.make("CellInsertPegs-v1")) as env:
+        actions = find_expert("CellInsertPegs-v1")(env, 0)
+        env.reset(0, options={"reconfigure": True})
+        solved = [env.step(action[None])[-1]["success"].item() for action in actions]
+        assert solved[-1]
+        world, found = env.simulation.worlds[0], []
+        left, right = (env.state.pose(f"peg_{arm}")[0].tolist() for arm in ("left", "right"))
+        above = [*left[:2], left[2] + 0.03, *left[3:]]
+        for first, second in ((above, right), (right, left), (left, right)):
+            world.set_pose("peg_left", first[:3], first[3:])
+            world.set_pose("peg_right", second[:3], second[3:])
+            info = look(env)
+            found.append([info[flag].item() for flag in ("is_one_in", "success")])
+        assert found == [[True, False], [False, False], [True, True]]
