@@ -302,3 +302,51 @@ def test_pegs_are_home_once_the_mallet_stands_on_its_mark_again():
             world.set_pose("mallet", mallet)
             found.append(look(env)["success"].item())
         assert found == [False, False, False, True]
+
+
+def test_cubes_count_in_a_bin_while_it_is_held_up():
+    with closing(tasks.make("CellFillHeldBin-v1")) as env:
+        actions = find_expert("CellFillHeldBin-v1")(env, 0)
+        env.reset(0, options={"reconfigure": True})
+        solved = [env.step(action[None])[-1]["success"].item() for action in actions]
+        assert solved[-1]
+        world, cubes = env.simulation.worlds[0], ("cube_left", "cube_right")
+        (x, y, z), found = env.state.position("bin")[0].tolist(), []
+        for height, beside in ((z, 0.0), (z, 0.2), (0.05, 0.0)):
+            world.set_pose("bin", (x, y, height), env.state.pose("bin")[0, 3:].tolist())
+            for cube, off in zip(cubes, (beside, 0.0), strict=True):
+                world.set_pose(cube, (x + off, y, height + 0.03))
+            info = look(env)
+            found.append([info[flag].item() for flag in ("is_one_in", "success")])
+        assert found == [[True, True], [True, False], [False, False]]
+
+
+def test_a_box_is_filled_once_its_lid_is_shut_over_both_cubes():
+    with closing(tasks.make("CellOpenBox-v1")) as env:
+        env.reset(seed=0)
+        world, found = env.simulation.worlds[0], []
+        x, y, _ = env.state.position("box")[0].tolist()
+        for lid, beside in ((1.2, 0.0), (0.0, 0.0), (0.0, 0.3)):
+            world.set_joints("box", lid=lid)
+            world.set_pose("cube_left", (x + beside, y, 0.03))
+            world.set_pose("cube_right", (x, y, 0.07))
+            info = look(env)
+            found.append([info[flag].item() for flag in ("is_open", "are_both_in", "success")])
+        assert found == [[True, True, False], [False, True, True], [False, False, False]]
+
+
+def test_each_peg_counts_in_the_socket_of_its_own_side():
+    with closing(tasks.make("CellInsertPegs-v1")) as env:
+        actions = find_expert("CellInsertPegs-v1")(env, 0)
+        env.reset(0, options={"reconfigure": True})
+        solved = [env.step(action[None])[-1]["success"].item() for action in actions]
+        assert solved[-1]
+        world, found = env.simulation.worlds[0], []
+        left, right = (env.state.pose(f"peg_{arm}")[0].tolist() for arm in ("left", "right"))
+        above = [*left[:2], left[2] + 0.03, *left[3:]]
+        for first, second in ((above, right), (right, left), (left, right)):
+            world.set_pose("peg_left", first[:3], first[3:])
+            world.set_pose("peg_right", second[:3], second[3:])
+            info = look(env)
+            found.append([info[flag].item() for flag in ("is_one_in", "success")])
+        assert found == [[True, False], [False, False], [True, True]]
