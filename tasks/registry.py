@@ -34,6 +34,7 @@ CATALOGUE = {
     "CellCrossOver-v1": "tasks.cells.cross_over:CellCrossOver",
     "CellFillDrawer-v1": "tasks.cells.fill_drawer:CellFillDrawer",
     "CellGatherBlocks-v1": "tasks.cells.gather_blocks:CellGatherBlocks",
+    "CellHandMugOn-v1": "tasks.cells.hand_mug_on:CellHandMugOn",
     "CellHoldAndPush-v1": "tasks.cells.hold_and_push:CellHoldAndPush",
     "CellLiftBoard-v1": "tasks.cells.lift_board:CellLiftBoard",
     "CellLiftPot-v1": "tasks.cells.lift_pot:CellLiftPot",

@@ -30,6 +30,7 @@ CATALOGUE = {
     "CellCrossOver-v1": "robot_layouts.experts.cells.cross_over:cross_over",
     "CellFillDrawer-v1": "robot_layouts.experts.cells.fill_drawer:fill_drawer",
     "CellGatherBlocks-v1": "robot_layouts.experts.cells.gather_blocks:gather_blocks",
+    "CellHandMugOn-v1": "robot_layouts.experts.cells.hand_mug_on:hand_mug_on",
     "CellHoldAndPush-v1": "robot_layouts.experts.cells.hold_and_push:hold_and_push",
     "CellLiftBoard-v1": "robot_layouts.experts.cells.lift_board:lift_board",
     "CellLiftPot-v1": "robot_layouts.experts.cells.lift_pot:lift_pot",

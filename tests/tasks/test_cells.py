@@ -232,3 +232,18 @@ def test_a_block_is_passed_on_by_corner_and_end_into_the_box(place: str, reached
         x, y, _ = env.state.position(place)[0].tolist()
         info = put(env, block=(x, y, 0.025))
         assert [info[flag].item() for flag in ("is_at_corner", "is_at_end", "success")] == reached
+
+
+@pytest.mark.parametrize(
+    ("off", "up", "solved"), [(0.0, 0.03, True), (0.05, 0.03, False), (0.0, 0.06, False)]
+)
+def test_a_mug_counts_once_it_stands_on_the_trivet_on_its_mark(off: float, up: float, solved: bool):
+    with closing(tasks.make("CellHandMugOn-v1")) as env:
+        env.reset(seed=0)
+        x, y, _ = env.state.position("mark")[0].tolist()
+        spot = env.state.position("spot")[0, :2].tolist()
+        info = put(env, mug=(*spot, 0.0))
+        assert info["is_handed_on"].item()
+        assert not put(env, mug=(x + off, y, up))["success"].item()  # the trivet is far
+        info = put(env, trivet=(x, y, 0.015), mug=(x + off, y, up))
+        assert info["success"].item() is solved
