@@ -43,6 +43,7 @@ CATALOGUE = {
     "CellMovePot-v1": "tasks.cells.move_pot:CellMovePot",
     "CellPackTote-v1": "tasks.cells.pack_tote:CellPackTote",
     "CellPassAround-v1": "tasks.cells.pass_around:CellPassAround",
+    "CellPassGlass-v1": "tasks.cells.pass_glass:CellPassGlass",
     "CellPressInOrder-v1": "tasks.cells.press_in_order:CellPressInOrder",
     "CellPressTogether-v1": "tasks.cells.press_together:CellPressTogether",
     "CellPushBar-v1": "tasks.cells.push_bar:CellPushBar",

@@ -39,6 +39,7 @@ CATALOGUE = {
     "CellMovePot-v1": "robot_layouts.experts.cells.move_pot:move_pot",
     "CellPackTote-v1": "robot_layouts.experts.cells.pack_tote:pack_tote",
     "CellPassAround-v1": "robot_layouts.experts.cells.pass_around:pass_around",
+    "CellPassGlass-v1": "robot_layouts.experts.cells.pass_glass:pass_glass",
     "CellPressInOrder-v1": "robot_layouts.experts.cells.press_in_order:press_in_order",
     "CellPressTogether-v1": "robot_layouts.experts.cells.press_together:press_together",
     "CellPushBar-v1": "robot_layouts.experts.cells.push_bar:push_bar",

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from functools import partial
 from math import pi
 from typing import Any
 
 import numpy as np
 
-from robot_layouts.experts.cells.moves import Place, carry, stand_back
+from robot_layouts.experts.cells.moves import Place, carry, rim_holds, stand_back
 from robot_layouts.experts.cells.tips import push
-from robot_layouts.experts.geometry import heading
-from robot_layouts.experts.grasps import YAWS, need_fingers, thing_grips
+from robot_layouts.experts.grasps import YAWS, need_fingers
 from robot_layouts.experts.rehearsal import Plan, first_success
-from robot_layouts.experts.script import Pose, Scene, Script, Waypoint
+from robot_layouts.experts.script import Scene, Script, Waypoint
 from robot_layouts.kinematics.rotations import Floats
 from tasks import TaskEnv
 from tasks.cells.hand_mug_on import THICK, CellHandMugOn
@@ -39,7 +37,7 @@ def hand_mug_on(task: TaskEnv, seed: int) -> Plan:
 
 def _script(task: TaskEnv, side: float, strokes: int) -> Script:
     def handing(arm: str, place: Place, **turns: Any) -> tuple[Waypoint, ...]:
-        grips = partial(_rim, arm=arm, side=side)
+        grips = rim_holds(CellHandMugOn.mug.descriptor, "mug", arm, side)
         return carry(task, arm, "mug", grips, place, yaws=YAWS, back=0.1, around=0.01, **turns)
 
     pushing = push(task, "pusher", "trivet", _mark, strokes=strokes, gap=0.16)
@@ -51,16 +49,6 @@ def _script(task: TaskEnv, side: float, strokes: int) -> Script:
         ),
         "pusher": (*pushing, stand_back(task, "pusher")),
     }
-
-
-def _rim(scene: Scene, arm: str, side: float) -> list[Pose]:
-    """Return grips of the rim at one place, the one most on a side seen from the arm (rad)."""
-    mug = scene.body("mug")[0]
-    towards = heading(mug, scene.base(arm)) + side
-    way = np.array([np.cos(towards), np.sin(towards), 0.0])
-    grips = thing_grips(CellHandMugOn.mug.descriptor, "mug", 0.08, lean=0.6)(scene)
-    most = max((float((place - mug) @ way) for place, _ in grips), default=0.0)
-    return [grip for grip in grips if (grip[0] - mug) @ way > most - 1e-3]
 
 
 def _spot(scene: Scene) -> Floats:
