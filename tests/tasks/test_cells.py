@@ -350,3 +350,31 @@ def test_each_peg_counts_in_the_socket_of_its_own_side():
             info = look(env)
             found.append([info[flag].item() for flag in ("is_one_in", "success")])
         assert found == [[True, False], [False, False], [True, True]]
+
+
+@pytest.mark.parametrize(
+    ("off", "up", "solved"), [(0.0, 0.03, True), (0.05, 0.03, False), (0.0, 0.06, False)]
+)
+def test_a_mug_counts_once_it_stands_on_the_trivet_on_its_mark(off: float, up: float, solved: bool):
+    with closing(tasks.make("CellHandMugOn-v1")) as env:
+        env.reset(seed=0)
+        x, y, _ = env.state.position("mark")[0].tolist()
+        spot = env.state.position("spot")[0, :2].tolist()
+        info = put(env, mug=(*spot, 0.0))
+        assert info["is_handed_on"].item()
+        assert not put(env, mug=(x + off, y, up))["success"].item()  # the trivet is far
+        info = put(env, trivet=(x, y, 0.015), mug=(x + off, y, up))
+        assert info["success"].item() is solved
+
+
+@pytest.mark.parametrize(("kept", "solved"), [(2, True), (1, False)])
+def test_a_cup_is_served_with_both_balls_in_it(kept: int, solved: bool):
+    with closing(tasks.make("CellPassGlass-v1")) as env:
+        env.reset(seed=0)
+        x, y, _ = env.state.position("mark")[0].tolist()
+        balls = {"ball_one": (x - 0.0115, y, 0.016), "ball_two": (x + 0.0115, y, 0.016)}
+        beside = {"ball_two": (x + 0.1, y, 0.011)} if kept < 2 else {}
+        info = put(env, cup=(x, y, 0.0), **(balls | beside))
+        assert [info["is_served"].item(), info["success"].item()] == [solved, False]
+        env.simulation.worlds[0].set_joints("bell", cap=0.008)
+        assert look(env)["success"].item() is solved

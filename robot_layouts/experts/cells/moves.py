@@ -10,8 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from robot_layouts.experts.geometry import backed_off, turn, yaw_of
-from robot_layouts.experts.grasps import PLACE_YAWS, bringing, cube_grips, held_at, lowerable, pick
+from objects import ObjectDescriptor
+from robot_layouts.experts.geometry import backed_off, heading, turn, yaw_of
+from robot_layouts.experts.grasps import (
+    PLACE_YAWS,
+    bringing,
+    cube_grips,
+    held_at,
+    lowerable,
+    pick,
+    thing_grips,
+)
 from robot_layouts.experts.reaching import reaching
 from robot_layouts.experts.script import CLOSED, OPEN, Pose, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
@@ -26,6 +35,7 @@ MOST_GRIPS = 6
 FREE, BEYOND = 0.08, -0.02  # before a handle, and beyond it so that it is pushed home (m)
 TILTS = tuple(np.radians((0, 20, 35, 50)))  # of grippers that hold cubes, from straight down
 NEAR_BASE, WAITING = 0.4, 0.3  # of a hand that waits, from its base, and over the table (m)
+LEANT, SAME = 0.6, 1e-3  # rad, of grips of a rim, and m between two of the same place at most
 READY = 0.03  # rad: so near a gripper comes to its place above a body before it goes down
 
 
@@ -41,6 +51,29 @@ def cube_holds(body: str, up: float = 0.0) -> Grips:
         position, quaternion = scene.body(body)
         cube = position + (0.0, 0.0, up), quaternion
         return [grip for tilt in TILTS for grip in cube_grips(cube, tilt=tilt)]
+
+    return grips
+
+
+def rim_holds(thing: ObjectDescriptor, body: str, robot: str, side: float = 0.0) -> Grips:
+    """Return the grips of a vessel by one place on its rim.
+
+    Args:
+        thing: Says where it is grasped.
+        body: Its name in the world.
+        robot: The arm.
+        side: Where that place is, seen from the vessel's middle, from the way to the arm on (rad).
+    """
+    rim = replace(thing, grasps=tuple(grasp for grasp in thing.grasps if grasp.part == "rim"))
+    on_rim = thing_grips(rim, body, 0.08, lean=LEANT)
+
+    def grips(scene: Scene) -> list[Pose]:
+        middle, _ = scene.body(body)
+        towards = heading(middle, scene.base(robot)) + side
+        way = np.array([np.cos(towards), np.sin(towards), 0.0])
+        found = [((grip[0] - middle) @ way, grip) for grip in on_rim(scene)]
+        most = max((out for out, _ in found), default=0.0)
+        return [grip for out, grip in found if out > most - SAME]
 
     return grips
 
