@@ -11,10 +11,9 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -106,41 +105,35 @@ def ways() -> dict[str, Way]:
     }
 
 
-def verified(before: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
-    """Verify a receipt of each cell in several ways, and return how often all was equal.
+def verified(before: Mapping[str, Any], names: Collection[str]) -> Iterator[dict[str, Any]]:
+    """Verify a receipt of each cell in several ways, and yield after each how often all was equal.
 
     Args:
         before: What was verified before in other ways, which is kept.
         names: Which ways (all without QEMU).
     """
-    known = ways()
+    known, rows = ways(), dict(before.get("ways", {}))
     chosen = names or [name for name, way in known.items() if not way.setting.emulated]
-    first = next(iter(known))  # which writes the receipt
-    found: dict[str, dict[str, Any]] = {
-        name: {"about": way.setting.about, "cells": {}}
-        for name, way in known.items()
-        if name == first or name in chosen
-    }
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for task, name in tqdm(list(product(CELLS, found)), disable=None):
-        way, file = known[name], str(FOLDER / f"{task}.json")
+    for name in tqdm([name for name in known if name in chosen], disable=None):
+        way, cells = known[name], dict[str, dict[str, int] | None]()
         count = EMULATED if way.setting.emulated else EPISODES
-        request = {"task": task, "file": file, "workers": way.workers, "count": count}
-        try:
-            (answer,) = answers_under(way.setting, "benchmarks.receipts", request, 1)
-        except SimulationError:  # the driver ends the process
-            answer = None
-        found[name]["cells"][task] = answer
-    every = {**before.get("ways", {}), **found}
-    rows = {name: every[name] for name in known if name in every}
-    written = Receipt.read(FOLDER / f"{next(iter(CELLS))}.json").environment
-    return {
-        "episodes": EPISODES,
-        "steps": STEPS,
-        "size": SIZE,
-        "written_on": written["processor"]["name"],
-        "ways": rows,
-    }
+        for task in CELLS:
+            file = str(FOLDER / f"{task}.json")
+            request = {"task": task, "file": file, "workers": way.workers, "count": count}
+            try:
+                (cells[task],) = answers_under(way.setting, "benchmarks.receipts", request, 1)
+            except SimulationError:  # the driver ends the process
+                cells[task] = None
+        rows[name] = {"about": way.setting.about, "cells": cells}
+        written = Receipt.read(FOLDER / f"{next(iter(CELLS))}.json").environment
+        yield {
+            "episodes": EPISODES,
+            "steps": STEPS,
+            "size": SIZE,
+            "written_on": written["processor"]["name"],
+            "ways": {name: rows[name] for name in known if name in rows},
+        }
 
 
 def _verify(task: str, file: str, workers: int, count: int) -> dict[str, int]:
