@@ -85,7 +85,7 @@ class Way(NamedTuple):
 
 
 def ways() -> dict[str, Way]:
-    """Return all of them by name, all portable; the first that is tried writes a missing receipt."""
+    """Return all of them by name, all portable; the first to run writes a missing receipt."""
     portable = portable_variables(os.environ, numpy_versions())
 
     def way(
