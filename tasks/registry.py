@@ -65,6 +65,7 @@ CATALOGUE = {
     "CellShutSuitcase-v1": "tasks.cells.shut_suitcase:CellShutSuitcase",
     "CellSortByWord-v1": "tasks.cells.sort_by_word:CellSortByWord",
     "CellSortCubes-v1": "tasks.cells.sort_cubes:CellSortCubes",
+    "CellSqueezeBox-v1": "tasks.cells.squeeze_box:CellSqueezeBox",
     "CellStackInOrder-v1": "tasks.cells.stack_in_order:CellStackInOrder",
     "CellStowTwo-v1": "tasks.cells.stow_two:CellStowTwo",
     "CellSwapPlaces-v1": "tasks.cells.swap_places:CellSwapPlaces",

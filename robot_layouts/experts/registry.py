@@ -61,6 +61,7 @@ CATALOGUE = {
     "CellShutSuitcase-v1": "robot_layouts.experts.cells.shut_suitcase:shut_suitcase",
     "CellSortByWord-v1": "robot_layouts.experts.cells.sort_by_word:sort_by_word",
     "CellSortCubes-v1": "robot_layouts.experts.cells.sort_cubes:sort_cubes",
+    "CellSqueezeBox-v1": "robot_layouts.experts.cells.squeeze_box:squeeze_box",
     "CellStackInOrder-v1": "robot_layouts.experts.cells.stack_in_order:stack_in_order",
     "CellStowTwo-v1": "robot_layouts.experts.cells.stow_two:stow_two",
     "CellSwapPlaces-v1": "robot_layouts.experts.cells.swap_places:swap_places",

@@ -18,9 +18,8 @@ from tasks import (
     World,
     is_at_rest,
     register_task,
-    transform,
 )
-from tasks.maths import Array, Floats, norm
+from tasks.maths import Array, Floats
 
 RADIUS, NEAR, UPRIGHT, PRESSED = 0.011, 0.05, radians(5), 0.005  # m, m, rad, m
 LOW, HIGH = (-0.036, -0.036, 0.0), (0.036, 0.036, 0.1)  # of a ball in the cup, in its frame (m)
@@ -32,8 +31,8 @@ class CellPassGlass(CellTask):
     """Pass the cup on by the spot without losing a ball, stand it on the mark, and ring.
 
     The cup, with two balls in it, stands before the giver, x in [-0.26, -0.14], y in
-    [-0.42, -0.26]; the mark is at x in [0.1, 0.18], y in [0.34, 0.42]; the bell stands before the
-    ringer, x in [-0.16, -0.04], y in [0.52, 0.6] (m). The taker reaches the spot, but not the cup.
+    [-0.42, -0.26], the bell before the ringer, x in [-0.16, -0.04], y in [0.52, 0.6]; the mark is
+    at x in [0.1, 0.18], y in [0.34, 0.42] (m). The taker reaches the spot, but not the cup.
 
     Success: the cup stands on the mark, upright to 5°, within 5 cm and let go, both balls are in
     it, and the bell is pressed by 5 mm.
@@ -77,16 +76,15 @@ class CellPassGlass(CellTask):
         full = self.count([self.is_within(state, b, "cup", LOW, HIGH) for b in BALLS]) >= 2
         upright = state.rotation("cup")[:, 2, 2] >= cos(UPRIGHT)
         stands = full & upright & is_at_rest(state, "cup") & ~given & ~taken
-        served = stands & (state.planar_distance("cup", "mark") <= NEAR)
+        spot, mark = (state.planar_distance("cup", place) <= NEAR for place in ("spot", "mark"))
         return {
             "is_taken": given & full,
-            "is_passed": stands & (state.planar_distance("cup", "spot") <= NEAR),
-            "is_served": served,
-            "success": served & (state.joint("bell", "cap") >= PRESSED),
+            "is_passed": stands & spot,
+            "is_served": stands & mark,
+            "success": stands & mark & (state.joint("bell", "cap") >= PRESSED),
         }
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cup to the mark and to the taker's hand, and of the ringer's tip to the bell."""
-        top = state.array((self.bell.descriptor.points["top"].position,))
-        tip = norm(transform(state.pose("bell"), top) - state.tcp_position("ringer"))
-        return [state.planar_distance("cup", "mark"), state.tcp_distance("taker", "cup"), tip]
+        hands = [state.tcp_distance(*pair) for pair in (("taker", "cup"), ("ringer", "bell"))]
+        return [state.planar_distance("cup", "mark"), *hands]

@@ -378,3 +378,21 @@ def test_a_cup_is_served_with_both_balls_in_it(kept: int, solved: bool):
         assert [info["is_served"].item(), info["success"].item()] == [solved, False]
         env.simulation.worlds[0].set_joints("bell", cap=0.008)
         assert look(env)["success"].item() is solved
+
+
+@pytest.mark.parametrize(
+    ("aside", "up", "stages"),
+    [
+        (0.0, 0.11, [False, True]),
+        (0.0, 0.14, [True, False]),
+        (0.1, 0.14, [False, False]),
+        (0.1, 0.06, [False, False]),
+    ],
+)
+def test_a_box_belongs_on_the_plinth_with_the_tips_away(
+    aside: float, up: float, stages: list[bool]
+):
+    with closing(tasks.make("CellSqueezeBox-v1")) as env:
+        env.reset(seed=0)
+        info = put(env, plinth=(0.0, -0.25, 0.025), box=(aside, -0.25, up))
+        assert [info[flag].item() for flag in ("is_plinth_under", "success")] == stages

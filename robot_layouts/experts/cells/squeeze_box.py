@@ -1,0 +1,83 @@
+"""CellSqueezeBox: two tips press and rise in step, wait for the plinth, and come down again."""
+
+from __future__ import annotations
+
+from functools import partial
+from math import pi
+
+import numpy as np
+
+from robot_layouts.experts.cells.moves import stand_back
+from robot_layouts.experts.cells.tips import push
+from robot_layouts.experts.reaching import reaching
+from robot_layouts.experts.rehearsal import Plan, first_success
+from robot_layouts.experts.script import CLOSED, Scene, Script, Waypoint
+from robot_layouts.kinematics.rotations import Floats
+from tasks import TaskEnv
+from tasks.cells.squeeze_box import BOX, HIGH, PLINTH
+
+SIDES = {"west": -1.0, "east": 1.0}
+GAP, OVER = 0.09, 0.1  # of tips before the box's sides, and higher than where they press (m)
+HELD = 0.085  # m; height of the tips when they press: hands stay above the box
+LEGS, RAISED = 5, HIGH + 0.04  # in how many steps it is lifted, and how far (m)
+TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))  # how deep tips press (m), and strokes of the push
+SHORT = np.array(
+    [0.0, 0.02, 0.0]
+)  # of the box, where the push aims, as it goes a little too far (m)
+
+
+def squeeze_box(task: TaskEnv, seed: int) -> Plan:
+    """Return the actions of all arms, (T, A), that set the box on the plinth."""
+    return first_success(
+        task,
+        seed,
+        lambda scene: [_script(task, *tried) for tried in TRIED],
+        as_declared=True,
+    )
+
+
+def _script(task: TaskEnv, deep: float, strokes: int) -> Script:
+    start: list[Floats] = []  # where the box stood
+
+    def under(scene: Scene) -> Floats:
+        return scene.body("box")[0] - SHORT
+
+    pushing = push(
+        task, "pusher", "plinth", under, strokes=strokes, gap=0.2, after=[f"west.up {LEGS - 1}"]
+    )
+    return {
+        "pusher": (*pushing, stand_back(task, "pusher")),
+        **{arm: _pressing(task, arm, deep, start) for arm in SIDES},
+    }
+
+
+def _pressing(task: TaskEnv, arm: str, deep: float, start: list[Floats]) -> tuple[Waypoint, ...]:
+    (other,) = (each for each in SIDES if each != arm)
+    go = partial(reaching, task, arm, leans=(0.0,), as_it_is=False, gripper=CLOSED)
+
+    def beside(scene: Scene, out: float, up: float) -> Floats:
+        start[:] = start or [scene.body("box")[0]]
+        x, y, _ = start[0]
+        return np.array([x + SIDES[arm] * (BOX[0] + out), y, HELD + up])
+
+    def step(name: str, up: float, before: str) -> Waypoint:
+        place = partial(beside, out=-deep, up=up)
+        after = (f"{other}.{before}", *(("pusher.away plinth",) if name == "down 0" else ()))
+        return go(name, place, near=pi, steps=6, after=after)
+
+    ups = [RAISED * (leg + 1) / LEGS for leg in range(LEGS)]
+    downs = [RAISED + (2 * PLINTH[2] - RAISED) * (leg + 1) / LEGS for leg in range(LEGS)]
+    steps = {"squeeze": 0.0} | {f"up {i}": up for i, up in enumerate(ups)}
+    steps |= {f"down {i}": up for i, up in enumerate(downs)}
+    before = dict(zip(steps, ["beside", *steps], strict=False))
+    return (
+        go("over", partial(beside, out=GAP, up=OVER), near=0.05),
+        go("beside", partial(beside, out=GAP, up=0.0), near=0.03),
+        *(step(name, up, before[name]) for name, up in steps.items()),
+        go(
+            "leave",
+            partial(beside, out=GAP, up=2 * PLINTH[2]),
+            near=0.05,
+            after=(f"{other}.down {LEGS - 1}",),
+        ),
+    )
