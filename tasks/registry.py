@@ -42,6 +42,7 @@ CATALOGUE = {
     "CellLoadTray-v1": "tasks.cells.load_tray:CellLoadTray",
     "CellMountGears-v1": "tasks.cells.mount_gears:CellMountGears",
     "CellMovePot-v1": "tasks.cells.move_pot:CellMovePot",
+    "CellPackKit-v1": "tasks.cells.pack_kit:CellPackKit",
     "CellPackTote-v1": "tasks.cells.pack_tote:CellPackTote",
     "CellPassAround-v1": "tasks.cells.pass_around:CellPassAround",
     "CellPressInOrder-v1": "tasks.cells.press_in_order:CellPressInOrder",

@@ -38,6 +38,7 @@ CATALOGUE = {
     "CellLoadTray-v1": "robot_layouts.experts.cells.load_tray:load_tray",
     "CellMountGears-v1": "robot_layouts.experts.cells.mount_gears:mount_gears",
     "CellMovePot-v1": "robot_layouts.experts.cells.move_pot:move_pot",
+    "CellPackKit-v1": "robot_layouts.experts.cells.pack_kit:pack_kit",
     "CellPackTote-v1": "robot_layouts.experts.cells.pack_tote:pack_tote",
     "CellPassAround-v1": "robot_layouts.experts.cells.pass_around:pass_around",
     "CellPressInOrder-v1": "robot_layouts.experts.cells.press_in_order:press_in_order",
