@@ -47,6 +47,7 @@ CATALOGUE = {
     "CellMountGears-v1": "tasks.cells.mount_gears:CellMountGears",
     "CellMovePot-v1": "tasks.cells.move_pot:CellMovePot",
     "CellOpenBox-v1": "tasks.cells.open_box:CellOpenBox",
+    "CellPackKit-v1": "tasks.cells.pack_kit:CellPackKit",
     "CellPackTote-v1": "tasks.cells.pack_tote:CellPackTote",
     "CellPassAround-v1": "tasks.cells.pass_around:CellPassAround",
     "CellPassGlass-v1": "tasks.cells.pass_glass:CellPassGlass",

@@ -43,6 +43,7 @@ CATALOGUE = {
     "CellMountGears-v1": "robot_layouts.experts.cells.mount_gears:mount_gears",
     "CellMovePot-v1": "robot_layouts.experts.cells.move_pot:move_pot",
     "CellOpenBox-v1": "robot_layouts.experts.cells.open_box:open_box",
+    "CellPackKit-v1": "robot_layouts.experts.cells.pack_kit:pack_kit",
     "CellPackTote-v1": "robot_layouts.experts.cells.pack_tote:pack_tote",
     "CellPassAround-v1": "robot_layouts.experts.cells.pass_around:pass_around",
     "CellPassGlass-v1": "robot_layouts.experts.cells.pass_glass:pass_glass",

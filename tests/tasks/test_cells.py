@@ -285,6 +285,17 @@ def test_brackets_count_once_they_hang_on_the_pegs_in_their_order():
         assert put(env, red=seats[0], blue=back, bar=seats[2])["success"].item()
 
 
+def test_parts_belong_in_the_pockets_of_their_colours():
+    with closing(tasks.make("CellPackKit-v1")) as env:
+        env.reset(seed=0)
+        pockets = [env.state.position(f"pocket_{arm}")[0].tolist() for arm in env.layout.arms]
+        block, rod, stair, cross = ((x, y, z + 0.032) for x, y, z in pockets)
+        info = put(env, block=rod, rod=block, stair=stair, cross=cross)
+        assert info["are_two_in"].item()
+        assert not info["are_three_in"].item()
+        assert put(env, block=block, rod=rod)["success"].item()
+
+
 def test_pegs_are_home_once_the_mallet_stands_on_its_mark_again():
     with closing(tasks.make("CellHammerPegs-v1")) as env:
         env.reset(seed=0)
