@@ -30,6 +30,7 @@ from tasks.cells.hold_gate import LONG, THICK, CellHoldGate
 
 WIDE, PULLS = 1.5, 10  # rad; how far the leaf is pulled open, and in how many parts
 AWAY = np.array([0.4, 0.0, 0.3])  # where the giver goes in the end, from its base (m)
+LEVEL = pi / 2 + 0.01  # rad; of a hand that pulls at the handle, with room for rounding
 BEFORE = 0.18  # m; of a hand from the handle, before it goes straight there
 HELD = LONG - 0.05  # where along the bar it is held (m)
 START, END, OUT = 0.32, 0.02, -0.32  # of the bar's middle before the gate and behind it (m)
@@ -78,7 +79,7 @@ def _script(task: TaskEnv, count: int) -> Script:
 
 
 def _holding(task: TaskEnv, done: Sequence[str]) -> tuple[Waypoint, ...]:
-    handle = thing_grips(CellHoldGate.gate.descriptor, "gate", 0.08, lean=pi / 2)
+    handle = thing_grips(CellHoldGate.gate.descriptor, "gate", 0.08, lean=LEVEL)
     grips = in_reach(task, "porter", handle, above=BEFORE, on=_pull)
     shutting = move_joint("porter", "gate", "leaf", 0.0, steps=PULLS)
     return (
