@@ -66,6 +66,7 @@ QUESTIONS: Mapping[str, str] = {
     "no_raw": "no raw exception",
     "no_crash": "no crash",
 }
+WORK = ("fingers", "between", "grasps", "square", "hand_over", "two_hands")
 MJCF_QUESTIONS: Mapping[str, str] = {
     "loads": "loads",
     "arm": "arms",
@@ -217,7 +218,9 @@ def judge_mjcf(seen: Seen, expected: Expected) -> dict[str, Answer]:
 
 
 def _work(seen: Seen, expected: Expected) -> dict[str, Answer]:
-    """Answer for fingers, grasps, control of the TCP and the hand-over."""
+    """Answer for fingers, grasps, control of the TCP and the hand-over, if they were tried."""
+    if "made_with" not in seen:  # a record from before they were
+        return dict.fromkeys(WORK, NOT_ASKED)
     hands = [arm for arm in expected.arms.values() if arm.gripper]
     grippers = seen.get("grasps", {}).get("grippers", ())
     known = [one for one in grippers if one["fingers"]]

@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fnmatch import fnmatch
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, distribution
+from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 from typing import Any
 
@@ -172,6 +172,7 @@ def robots(
         "robots",
         versions=record["versions"],
         judged=judged,
+        before=[key for key, seen, *_ in judged if "made_with" not in seen],
         shares=_shares(judged),
         tables={kind: (len(rows), _rows(rows)) for kind, rows in kinds.items() if rows},
         reasons=_reasons(judged, LONGEST_REASON, "…"),
@@ -279,7 +280,7 @@ def probe(robot: Robot, seconds: float) -> Record:
                 ended = f"ended with {done.returncode}: {last}"
         output.seek(0)
         lines = output.read().decode(errors="replace").splitlines()
-    seen: Record = {"missing": robot.missing_meshes()}
+    seen: Record = {"made_with": version("robot-layouts"), "missing": robot.missing_meshes()}
     for line in lines:
         if line.startswith("{"):  # libraries print, too
             seen.update(json.loads(line))

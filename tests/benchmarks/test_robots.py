@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -106,7 +107,8 @@ class TestProbe:
         save(tmp_path, arm())
         quick_probe(f"{seeing({'loads': {}})}\n{program}")
         seen = probe(Robot("mine", "small.urdf", tmp_path), 60.0)
-        assert seen == {"missing": [], "loads": {}, "ended": ended}
+        made = version("robot-layouts")
+        assert seen == {"made_with": made, "missing": [], "loads": {}, "ended": ended}
 
 
 class TestJudge:
@@ -157,6 +159,7 @@ class TestJudge:
         ]
         trial = {"drift": 0.0, "corner": 0.03, "reported": 0.029, "problem": None}
         seen = loaded(arm=(("l_1",), 1)) | {
+            "made_with": "0.3.0",
             "grasps": {"grippers": grippers},
             "tcp_control": {"trials": [trial]},
             "hand_over": {"hands": len(fingers), "solved": 8, "of": 9, "why": ["it fell"]},
