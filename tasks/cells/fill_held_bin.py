@@ -21,7 +21,7 @@ from tasks import (
 )
 from tasks.maths import Array, Floats, maximum
 
-HALF, HEIGHT, LEVEL = 0.02, 0.1, radians(15)  # of cubes, of the bin when it is up (m), and rad
+HALF, HEIGHT, LEVEL = 0.02, 0.08, radians(15)  # of cubes, of the bin when it is up (m), and rad
 LONG, WIDE, DEEP, WALL = 0.09, 0.08, 0.07, 0.002  # of the bin: half, half, whole, and half (m)
 GRIP = (0.145, 0.0, 0.05)  # where its handle is held, in its frame (m)
 LOW, HIGH = (-LONG, -WIDE, 0.0), (LONG, WIDE, DEEP)  # of a cube in the bin, in its frame (m)
@@ -51,7 +51,7 @@ class CellFillHeldBin(CellTask):
     its handle towards the holder to 23°; the cubes lie 34 to 42 cm from the middle before their
     arms, up to 8 cm aside, turned at random.
 
-    Success: both cubes are in the bin, let go, while the holder holds it 10 cm high, level to 15°.
+    Success: both cubes are in the bin, let go, while the holder holds it 8 cm high, level to 15°.
     """
 
     source = "robot-layouts; geometry and rewards are its own"

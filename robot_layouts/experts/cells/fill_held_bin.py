@@ -16,7 +16,7 @@ from robot_layouts.kinematics.rotations import Floats, rotate
 from tasks import TaskEnv
 from tasks.cells.fill_held_bin import FILLERS, GRIP, HEIGHT
 
-LEGS, RAISED = 3, HEIGHT + 0.02  # steps up, and how far (m)
+LEGS, RAISED = 3, HEIGHT + 0.04  # steps up, and how far (m)
 PLACES = {"left": (-0.02, -0.035, 0.095), "right": (-0.02, 0.035, 0.095)}  # in the bin's frame (m)
 
 
