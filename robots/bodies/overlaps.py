@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.kinematics.tree import Tree
 from robots.bodies.allowed import LinkPair, joined_pairs, rigid_groups, rigid_pairs, srdf_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls, shape_corners
 from robots.urdf.model import ModelJoint, UrdfModel
@@ -109,18 +110,17 @@ def always_overlapping(
     driven = [joint for joint in model.moving if joint.mimics is None]
     tree = kinematic_tree(model, [joint.name for joint in driven])
     hulls = read_hulls(model, urdf)
-    names = [tree.links[hull.link] for hull in hulls]
     waiting = np.array(counted_pairs(tree, hulls, besides), int).reshape(-1, 2)
     misses = np.zeros(len(waiting), int)
-    path = {name: [j.name for j in model.path_to(name) if j.moves] for name in set(names)}
-    chained = np.array([_two_in_a_row(path[names[a]], path[names[b]]) for a, b in waiting], bool)
-    most = (1 - np.where(chained, MOSTLY, ALWAYS)) * POSTURES
+    in_a_row = _two_in_a_row(tree, [tree.bodies[hull.link] for hull in hulls], waiting)
+    most = (1 - np.where(in_a_row, MOSTLY, ALWAYS)) * POSTURES
     low, high = np.array([joint.span for joint in driven]).reshape(-1, 2).T
     draws = np.random.default_rng(0).uniform(low, high, (POSTURES, len(driven)))
     for poses in tree.forward(draws):
         misses += ~overlapping(hulls, poses, waiting)
         kept = misses <= most
         waiting, misses, most = waiting[kept], misses[kept], most[kept]
+    names = [tree.links[hull.link] for hull in hulls]
     return frozenset(frozenset((names[a], names[b])) for a, b in waiting.tolist())
 
 
@@ -203,15 +203,18 @@ def _least_distance(
     return 2 * max(lengths, default=0.0) - sum(lengths) - loose
 
 
-def _two_in_a_row(one: Sequence[str], other: Sequence[str]) -> bool:
-    """Return whether one link is carried by another over two joints, by the joints that move each.
+def _two_in_a_row(tree: Tree, bodies: Sequence[int], pairs: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Return of which pairs one carries the other over two joints, (n,).
 
     Args:
-        one: Those from the root to one link, by name.
-        other: Likewise to the other.
+        tree: The links.
+        bodies: The body of each hull.
+        pairs: Of hulls, (n, 2).
     """
-    shorter, longer = sorted((one, other), key=len)
-    return len(longer) == len(shorter) + 2 and longer[:-2] == shorter
+    carriers = {body: tree.carrier(body) for body in set(bodies)}
+    second = np.array([tree.carrier(up) if (up := carriers[b]) >= 0 else -1 for b in bodies])
+    one, other = np.array(bodies)[pairs.T]
+    return (second[pairs[:, 0]] == other) | (second[pairs[:, 1]] == one)
 
 
 def _moving_between(one: str, other: str, model: UrdfModel) -> list[ModelJoint]:

@@ -27,7 +27,7 @@ from robots import RobotRegistry
 from robots.registry import CATALOGUE as ROBOTS
 from tasks.registry import CATALOGUE as TASKS
 
-LARGEST_GALLERY = 10_000_000  # bytes
+LARGEST_GALLERY = 12_000_000  # bytes
 LINK = re.compile(r"\]\(([^)#]+)\)")
 PICTURE = re.compile(r"!\[([^]]*)\]")
 
