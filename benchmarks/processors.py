@@ -169,10 +169,10 @@ def processors(
     if (pictures or receipts) and not render:
         if pictures:
             record["pictures"] = _drawn()
+            write_record(out, record)
         for seen in verified(record["receipts"], settings) if receipts else ():
             record["receipts"] = {"processor": _processor(), "driver": _driver(), **seen}
             write_record(out, record)
-        write_record(out, record)
     elif not render:
         libraries = {**versions_of(*PACKAGES), "glibc": platform.libc_ver()[1]}
         record |= {"processor": _processor(), "versions": record["versions"] | libraries}

@@ -83,11 +83,7 @@ class CellFillHeldBin(CellTask):
         level = state.rotation("bin")[:, 2, 2] >= cos(LEVEL)
         up = held & level & (state.position("bin")[:, 2] >= HEIGHT)
         inside = self.count(
-            [
-                self.is_within(state, f"cube_{arm}", "bin", LOW, HIGH)
-                & ~state.is_grasping(arm, f"cube_{arm}")
-                for arm in FILLERS
-            ]
+            [self.is_left_in(state, arm, f"cube_{arm}", "bin", LOW, HIGH) for arm in FILLERS]
         )
         return {
             "is_held": held,

@@ -72,13 +72,14 @@ class CellHoldGate(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the bar is there, let go, and the gate is shut."""
-        leaf, taken = state.joint("gate", "leaf"), state.is_grasping("taker", "bar")
+        leaf = state.joint("gate", "leaf")
+        given, taken = (state.is_grasping(arm, "bar") for arm in ("giver", "taker"))
         there = (state.planar_distance("bar", "mark") <= RADIUS) & is_at_rest(state, "bar")
         return {
             "is_open": leaf >= OPENED,
-            "is_handed": taken & ~state.is_grasping("giver", "bar"),
+            "is_handed": taken & ~given,
             "is_through": self._before(state) <= THROUGH,
-            "success": there & ~taken & (leaf <= SHUT),
+            "success": there & ~given & ~taken & (leaf <= SHUT),
         }
 
     def ways(self, state: State) -> list[Floats]:

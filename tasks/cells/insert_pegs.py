@@ -93,10 +93,9 @@ class CellInsertPegs(CellTask):
         up = held & level & (state.position("yoke")[:, 2] >= HEIGHT)
         inside = self.count(
             [
-                self.is_within(
-                    state, f"peg_{arm}", "yoke", (-NEAR, y - NEAR, 0), (NEAR, y + NEAR, IN)
+                self.is_left_in(
+                    state, arm, f"peg_{arm}", "yoke", (-NEAR, y - NEAR, 0), (NEAR, y + NEAR, IN)
                 )
-                & ~state.is_grasping(arm, f"peg_{arm}")
                 for arm, y in SIDES.items()
             ]
         )

@@ -84,11 +84,7 @@ class CellOpenBox(CellTask):
         """Success: both in it, let go, and the lid shut."""
         lid = state.joint("box", "lid")
         inside = self.count(
-            [
-                self.is_within(state, f"cube_{arm}", "box", LOW, HIGH)
-                & ~state.is_grasping(arm, f"cube_{arm}")
-                for arm in PACKERS
-            ]
+            [self.is_left_in(state, arm, f"cube_{arm}", "box", LOW, HIGH) for arm in PACKERS]
         )
         return {
             "is_open": lid >= OPENED,

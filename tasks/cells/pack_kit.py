@@ -94,8 +94,7 @@ class CellPackKit(CellTask):
         """Success: all are in their pockets, let go."""
         done = self.count(
             [
-                self.is_within(state, part, f"pocket_{arm}", LOW, HIGH)
-                & ~state.is_grasping(arm, part)
+                self.is_left_in(state, arm, part, f"pocket_{arm}", LOW, HIGH)
                 for arm, part in PARTS.items()
             ]
         )

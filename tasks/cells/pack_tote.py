@@ -66,10 +66,7 @@ class CellPackTote(CellTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all are in the tote, let go."""
         done = self.count(
-            [
-                self.is_within(state, part, "tote", LOW, HIGH) & ~state.is_grasping(arm, part)
-                for arm, part in PARTS.items()
-            ]
+            [self.is_left_in(state, arm, part, "tote", LOW, HIGH) for arm, part in PARTS.items()]
         )
         return {
             "is_one_in": done >= 1,

@@ -71,8 +71,7 @@ class CellStowTwo(CellTask):
         drawer, held = state.joint("case", "drawer"), state.joint("button", "cap") >= DOWN
         inside = self.count(
             [
-                self.is_within(state, f"cube_{arm}", "case.drawer", LOW, HIGH)
-                & ~state.is_grasping(arm, f"cube_{arm}")
+                self.is_left_in(state, arm, f"cube_{arm}", "case.drawer", LOW, HIGH)
                 for arm in PACKERS
             ]
         )

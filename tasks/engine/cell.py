@@ -136,6 +136,21 @@ class CellTask(MultiRobotTask):
         inside: Any = (place >= state.array((low,))) & (place <= state.array((high,)))
         return inside.all(1)
 
+    def is_left_in(
+        self, state: State, arm: str, body: str, other: str, low: Vector3, high: Vector3
+    ) -> Flags:
+        """Tell whether a body is inside another one and an arm holds it no more, (N,) bool.
+
+        Args:
+            state: The state.
+            arm: The arm that is to have let go.
+            body: The body.
+            other: What it is inside of; this and the corners are those of `is_within`.
+            low: The one corner (m).
+            high: The other (m).
+        """
+        return self.is_within(state, body, other, low, high) & ~state.is_grasping(arm, body)
+
     def count(self, flags: Sequence[Array]) -> Floats:
         """Return how many of some flags, each (N,) bool, are true, (N,)."""
         total: Any = sum(map(floats, flags))

@@ -21,13 +21,15 @@ GAP, OVER = 0.09, 0.1  # of tips before the box's sides, and higher than where t
 HELD = 0.085  # m; height of the tips when they press: hands stay above the box
 LEGS, RAISED = 5, HIGH + 0.04  # in how many steps it is lifted, and how far (m)
 TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))  # how deep tips press (m), and strokes of the push
-SHORT = np.array(
-    [0.0, 0.02, 0.0]
-)  # of the box, where the push aims, as it goes a little too far (m)
+SHORT = np.array([0.0, 0.02, 0.0])  # of the box, where the push aims, which goes too far (m)
 
 
 def squeeze_box(task: TaskEnv, seed: int) -> Plan:
-    """Return the actions of all arms, (T, A), that set the box on the plinth."""
+    """Return the actions of all arms, (T, A), that set the box on the plinth.
+
+    Raises:
+        TaskError: If an arm cannot reach what it should.
+    """
     return first_success(
         task,
         seed,
