@@ -12,7 +12,7 @@ from typing import Any
 
 from robot_layouts.core.errors import DescriptorError
 from robot_layouts.core.schema import check
-from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.kinematics.rotations import Floats, transform
 from robots.action_split import ActionSplit, JointGroup
 from robots.bodies.allowed import joined_pairs, rigid_pairs
 from robots.bodies.hulls import Hull, counted_pairs, read_hulls
@@ -38,6 +38,7 @@ from robots.urdf.summary import is_template_file, read_cleaned
 LinkPairs = tuple[tuple[str, str], ...]
 
 LISTED = 6  # pairs of links that a reason names
+SUNK = 1e-3  # m; deeper in the ground than what rests on it
 BEYOND = 1e-2  # rad, m; how far beyond its limits a joint of a known posture may be
 TCP = {  # what may be given of a tool centre point, in a `Tool`
     "tcp_link": ("link", str),
@@ -141,7 +142,7 @@ def guess(
     rest, posture = _rest(parts, allowed)
     distance, measured = find_reach(parts.model, main, tool, rest)
     fingers, _ = _fingers(parts, main)
-    wheels = _wheels(parts)
+    wheels, sunk = _wheels(parts), _below_ground(parts, rest)
     fields: dict[str, Any] = {
         "name": name or _as_name(parts.model.name or path.stem),
         "urdf": source,
@@ -155,9 +156,10 @@ def guess(
         "reach": distance,
         "source": f"guessed from {(file or path).name}",
         "allowed_collisions": (*allowed, *posture.overlapping),
-        "no_floor_contact": wheels,
+        "no_floor_contact": (*wheels, *(link for link in sunk if link not in wheels)),
         "limbs": _limbs(parts, rest),
     }
+    below = f"no_floor_contact: {', '.join(sunk)}, below the ground that its base drives on"
     rolling = f"no_floor_contact: {', '.join(wheels)}, by name; they do not roll"
     reasons = (
         *(f"repaired: {repair}" for repair in cleaned.repairs),
@@ -169,6 +171,7 @@ def guess(
         *parts.drives.reasons(),
         *_out_of_limits(parts),
         *((rolling,) if wheels else ()),
+        *((below,) if sunk else ()),
         *posture.reasons,
         measured,
         *overlaps,
@@ -257,6 +260,17 @@ def _wheels(parts: _Parts) -> tuple[str, ...]:
     return tuple(
         link for link in carried if link in model.collisions and words.has(link, words.WHEEL)
     )
+
+
+def _below_ground(parts: _Parts, rest: Mapping[str, float]) -> tuple[str, ...]:
+    """Return the links of a base that joints move which are in the ground, at its root's height."""
+    if not parts.anatomy.base:
+        return ()
+    stance = parts.stance
+    poses = stance.poses(stance.with_joints(rest))[0]
+    lowest = ((h.link, transform(poses[h.link], h.corners)[:, 2].min()) for h in parts.hulls)
+    sunk = {link for link, height in lowest if height < -SUNK}
+    return tuple(stance.tree.links[link] for link in sorted(sunk))
 
 
 def _fingers(parts: _Parts, limb: LimbJoints) -> tuple[Fingers | None, str]:

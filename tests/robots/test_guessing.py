@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from robot_layouts.simulation.checks.trial import try_robot
 from robots import LocalUrdf, RobotDescriptor, RobotLayoutsError
 from robots.bodies.hulls import load_model
 from robots.bodies.overlaps import overlapping
@@ -153,6 +154,22 @@ class TestLimbs:
         assert found.descriptor.action_dim == 6
         legs = next(reason for reason in found.reasons if reason.startswith("legs, held still"))
         assert "a JointGroup in the place of JointGroup.hold drives it" in legs
+
+    def test_a_column_that_sinks_into_the_ground_is_let_through(self, tmp_path):
+        parts = Parts()
+        parts.link("world", at="0 0 0.1")
+        parts.link("slid", at="0 0 0.1")
+        reach = {"limits": (-5.0, 5.0), "kind": "prismatic"}
+        parts.joint("along", "world", "slid", "0 0 0", axis="1 0 0", **reach)
+        parts.link("turned", 20.0, "0.4 0.4 0.1", "0 0 0.1")
+        parts.joint("about", "slid", "turned", "0 0 0", kind="continuous")
+        parts.link("column", 10.0, "0.2 0.2 1.0", "0 0 -0.5")
+        parts.joint("raise", "turned", "column", "0 0 0.3", limits=(0.0, 0.8), kind="prismatic")
+        parts.arm("column", "a", "0 0 0.1")
+        found = guess(parts, tmp_path)
+        assert found.descriptor.no_floor_contact == ("column",)
+        assert any("column, below the ground that its base" in r for r in found.reasons)
+        assert not try_robot(found.descriptor, 5).overlaps
 
     def test_a_robot_of_legs_alone_is_driven_all_the_same(self, tmp_path):
         parts = Parts()
