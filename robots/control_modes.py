@@ -122,7 +122,8 @@ def driven_in(
 def _arm(mode: str, split: ActionSplit, groups: Sequence[str]) -> str:
     """Return the group whose joints bring the TCP somewhere."""
     named = [name for name in groups if "arm" in name.split("_")]
-    for choice in (groups, named):
+    turning = [name for name in named if name.split("_")[-1] == "arm"]  # not left_arm_slide
+    for choice in (groups, named, turning):
         if len(choice) == 1:
             return choice[0]
     raise DescriptorError(

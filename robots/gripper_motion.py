@@ -14,6 +14,7 @@ from robot_layouts.core.errors import DescriptorError
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, quaternion_of, transform
 from robot_layouts.kinematics.tree import FIXED, Tree
 from robots.action_split import JointGroup, is_gripper
+from robots.bodies.hulls import shape_corners
 from robots.descriptor import RobotDescriptor
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import model_of
@@ -25,13 +26,16 @@ _SHORT = 1e-4  # m; shorter ways have no direction
 _POSTURES = 9  # of the gripper between its limits, of which the most closed and the next count
 SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
 _LEAST_WORK = 1e-9  # J; of drives that have no stiffness
+_SLIDES = 1e-6  # rad; fingers that turn less against each other slide
+_TOUCH = 2e-3  # m; jaws that are less deep in each other when closed touch
 _AJAR = 8  # number of the share at which the pads' way is seen
 
 
 class GripperMotion:
     """Where the fingers of a robot or a limb are as its gripper opens.
 
-    Each finger's pad is where the TCP lies when the gripper is closed: there fingers meet. How
+    Each finger's pad is where the TCP lies when the gripper is closed: there fingers meet, but for
+    jaws that slide and whose shapes are then inside each other: those meet before. How
     far a gripper is open is given as a share, 0 where the action number -1 drives it, or closes
     it as far as its joints go, and 1 where the number 1 does.
 
@@ -83,9 +87,12 @@ class GripperMotion:
             for finger, pad in zip(fingers, pads, strict=True)
         )
         self._middles = (one + other) / 2
-        self.openings = np.linalg.norm(one - other, axis=1)
         first, second = (poses[:, finger, :3, :3] for finger in fingers)
         self.angles = _turned(np.swapaxes(first, 1, 2) @ second)
+        apart = np.linalg.norm(one - other, axis=1)
+        if self.angles.max() < _SLIDES:
+            apart = np.maximum(apart - _inside(robot, hand[0] @ poses[0, fingers], one - other), 0)
+        self.openings = apart
         wrist = transform(hand[0], poses[0, wrist_of(robot, tree), :3, 3])
         self.turn = _axes(self._middles[0] - wrist, (one - other)[_AJAR])
 
@@ -141,6 +148,27 @@ class GripperMotion:
 
     def _positions(self, shares: Floats) -> Floats:
         return np.asarray(self._ends[:, 0] + shares[:, None] * self._travels)
+
+
+def _inside(robot: RobotDescriptor, closed: Floats, apart: Floats) -> float:
+    """Return how far the shapes of two jaws are inside each other when closed, if they are (m).
+
+    Args:
+        robot: Whose fingers are the jaws.
+        closed: Poses of the two links then, (2, 4, 4) (m).
+        apart: From the second pad to the first as they slide apart, (shares, 3) (m).
+    """
+    assert robot.fingers is not None
+    model, urdf, way = _model(robot), robot.urdf.locate(), _unit(apart[-1])
+    shapes = [model.collisions.get(link, ()) for link in robot.fingers.links]
+    if not all(shapes):
+        return 0.0
+    one, other = (
+        np.concatenate([transform(pose, shape_corners(shape, urdf)) for shape in solid]) @ way
+        for pose, solid in zip(closed, shapes, strict=True)
+    )
+    deep = float(other.max() - one.min())
+    return deep if _TOUCH < deep < np.linalg.norm(apart[-1]) else 0.0
 
 
 def _turned(rotations: Floats) -> Floats:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robots import DescriptorError, RobotDescriptor, RobotRegistry
-from robots.gripper_motion import aiming_joints, gripper_motion
+from robots.gripper_motion import SHARES, aiming_joints, gripper_motion
 
 
 def load(name: str) -> RobotDescriptor:
@@ -16,13 +16,19 @@ def load(name: str) -> RobotDescriptor:
 
 @pytest.mark.parametrize(
     ("name", "widest"),  # m: twice what one finger of each slides; of jaws, their tips when open
-    [("panda", 0.08), ("panda_pinch", 0.12), ("fetch", 0.1), ("so100", 0.1357), ("koch", 0.0774)],
+    [("panda", 0.08), ("fetch", 0.1), ("so100", 0.1357), ("koch", 0.0774)],
 )
 def test_how_wide_it_opens(name: str, widest: float):
     motion = gripper_motion(load(name))
     assert motion.widest == pytest.approx(widest, abs=1e-4)
     assert motion.openings[0] == pytest.approx(0.0)
     assert (np.diff(motion.openings) > 0).all()
+
+
+def test_jaws_whose_shapes_meet_before_their_joints_stop_open_from_there():
+    motion = gripper_motion(load("panda_pinch"))  # at 15 mm of the 60 that each of them slides
+    at = [np.interp(share, SHARES, motion.openings) for share in (0.0, 0.25, 0.5, 1.0)]
+    assert at == pytest.approx([0.0, 0.0, 0.03, 0.09], abs=1e-4)
 
 
 @pytest.mark.parametrize(
