@@ -23,7 +23,7 @@ ERROR = 2e-3  # m; a TCP may be so far from where it was sent without anything b
 SIDE = 0.1  # of the square (m)
 
 _HELD = 40  # steps
-_CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))  # sideways as the arm stretches, and upward
+_CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1), (0, 0))  # to the arm's own side, and upward
 _ON_A_SIDE, _IN_A_CORNER = 20, 20  # steps
 
 
@@ -89,6 +89,8 @@ class _Square:
         layout = single({NAME: robot}).in_control_mode({arm: mode})
         self._alone, self._arm, self._mode = RobotAlone(layout), arm, mode
         robot = layout[NAME].robot
+        limb = robot.limbs.get(arm.rpartition(".")[2])
+        self._own_side = -1.0 if limb is not None and limb.base[1] < 0 else 1.0
         groups = layout.arm(arm).robot.action_split.groups
         (name,) = (name for name, group in groups.items() if group.asks.tcp)
         self._group: JointGroup = groups[name]
@@ -115,10 +117,10 @@ class _Square:
         """
         out = self._start[:2] - self._root()[:2]
         length = float(np.linalg.norm(out))
-        sideways = (-out[1] / length, out[0] / length, 0.0) if length > ERROR else (0.0, 1.0, 0.0)
+        left = np.array((-out[1], out[0], 0.0)) / length if length > ERROR else np.eye(3)[1]
         corners: list[tuple[float, float, float]] = []
         here = self._start
-        for corner in np.array(_CORNERS[1:]) @ [sideways, (0.0, 0.0, 1.0)]:
+        for corner in np.array(_CORNERS[1:]) @ [self._own_side * left, np.eye(3)[2]]:
             there = self._start.copy()
             there[:3] += side * corner
             for step in range(1, _ON_A_SIDE + _IN_A_CORNER + 1):
