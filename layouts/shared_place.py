@@ -136,8 +136,6 @@ def working_reaches(
 def _share_down(layout: Arrangement, place: str) -> float:
     """Return at which share of its reach an arm still gets to the ground with its gripper down."""
     arm, owner = layout.arm(place), layout[layout.owner(place)]
-    if owner.robot.no_floor_contact:  # its arm works far above the ground it stands on
-        return 1.0
     if arm.robot.name in SHARES_DOWN and in_catalogue(arm.robot):
         return SHARES_DOWN[arm.robot.name]
     base = pose_matrix(owner.base_pose.position, owner.base_pose.quaternion)

@@ -91,7 +91,7 @@ def at_task(
             raise UnknownNameError("robot of this layout", place, layout)
     middle = _middle(layout)
     holding = held_widths(task, layout) if holding is None else holding
-    places = {place: _with(at, loaded.get(place, at.robot)) for place, at in layout.items()}
+    places = {place: _starting(at, loaded.get(place, at.robot)) for place, at in layout.items()}
     after = Layout(places, layout.frames)
     _, factors = working_factors(after, layout, [*layout], holding)
     _, by_reach = working_factors(after, layout, [*layout], ())
@@ -160,6 +160,17 @@ def _with(placement: Placement, robot: RobotDescriptor) -> Placement:
     if placement.keyframe not in robot.keyframes:
         placement = replace(placement, keyframe=None)
     return placement.with_robot(robot)
+
+
+def _starting(placement: Placement, robot: RobotDescriptor) -> Placement:
+    """Return a placement with another robot, its torso as low as it is to start."""
+    placement = _with(placement, robot)
+    if not is_known_arm(robot):
+        from layouts.ready import stooped
+
+        with suppress(AssetError, MissingPackageError):  # else its bodies are not known here
+            return stooped(placement)
+    return placement
 
 
 def _moved(placement: Placement, robot: RobotDescriptor, middle: Point, factor: float) -> Placement:

@@ -60,8 +60,17 @@ def test_an_arm_that_holds_things_stands_where_it_reaches_them_with_its_gripper_
 
 def test_a_larger_arm_that_holds_things_stands_no_farther_while_the_other_one_stays():
     """A Panda gets less far with its gripper down than it reaches, and its neighbour holds none."""
-    layout = at_task({"left": "fetch"}, TWO, holding=["left"])
+    layout = at_task({"left": "ur10"}, TWO, holding=["left"])
     assert layout["left"].base_position[:2] == TWO["left"].base_position[:2]
+
+
+def test_wheels_count_as_far_as_they_reach_down_with_their_torso_lowered():
+    """A Fetch reaches 1.13 m, and down to what lies on the ground 0.65 of that; a Panda 0.77 m."""
+    layout = at_task({"left": "fetch"}, TWO, holding=["left"])
+    x, y, _ = layout["left"].base_position
+    assert (x, y) == pytest.approx((0.0, -0.75 * 0.65 * 1.13 / (0.9 * 0.855)), abs=1e-3)
+    joints = dict(zip(layout["left"].robot.joints, layout["left"].start_qpos, strict=True))
+    assert joints["torso_lift_joint"] == 0.0
 
 
 def test_arms_that_would_start_inside_each_other_draw_their_hands_back():
