@@ -23,6 +23,7 @@ CAP = 0.15  # of a finger's length; its corners within it from the end make its 
 ALONG = 0.7  # cosine; how well a finger's y axis must lie along the way in which it opens
 EXACTLY = 0.95  # the same of its other axes
 STILL = 1e-3  # m; fingers whose tips part less do not open
+AGAINST = -0.2  # cosine; tips that close on each other move so much against each other, at least
 THUMB = ("thumb", "th")
 OPPOSITE = (("index", "ff"), ("middle", "mf"))  # fingers that a thumb meets, the first one first
 WIDE = 110.0  # degrees; of a finger that swings, as ManiSkill's SO-100 has it
@@ -124,6 +125,25 @@ class Fingertips:
         named = [[end for end in others if self.is_called(end, known)] for known in OPPOSITE]
         return thumbs[0], next((ends[0] for ends in named if ends), others[0])
 
+    def opposed(self, postures: Sequence[Mapping[str, float]]) -> tuple[str, str] | None:
+        """Return two of several ends that close on each other: a thumb, whatever it is called.
+
+        That one comes first which closes most against all others. Where no tips do, as those of
+        fingers side by side, there are none.
+
+        Args:
+            postures: Where the joints are, open first, then less and less (rad, m).
+        """
+        if len(self.ends) < 3 or len(postures) < 2:
+            return None
+        stances = [self.stance.with_joints(postures[at]) for at in (0, len(postures) // 2)]
+        wide, half = map(self._places, self.stance.poses(np.array(stances)))
+        ways = (half - wide) / np.maximum(np.linalg.norm(half - wide, axis=1, keepdims=True), STILL)
+        along = np.round(ways @ ways.T, 1)
+        thumb = int(along.sum(axis=1).argmin())
+        other = int(along[thumb].argmin())
+        return (self.ends[thumb], self.ends[other]) if along[thumb, other] <= AGAINST else None
+
     def _two_fingers(self) -> list[list[str]]:
         """Return the tips of each of two fingers, of which one has several; else nothing."""
         if len(self.ends) < 3 or any(map(self.is_thumb, self.ends)):
@@ -214,7 +234,8 @@ def find_fingers(
         tips: The tips of its fingers, if it has any.
         postures: Where its joints are, open first, then less and less (rad, m).
     """
-    ends, which = tips.grasping() if tips else None, f"{limb.name} fingers".lstrip()
+    ends = (tips.grasping() or tips.opposed(postures)) if tips else None
+    which = f"{limb.name} fingers".lstrip()
     if tips is None or ends is None:
         return None, Doubt(
             f"{which}: none, as {'no two tips' if limb.fingers else 'no fingers'} are found, so"

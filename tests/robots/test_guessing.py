@@ -392,16 +392,18 @@ class TestFingers:
         assert signed[1] @ (0.0, 0.0, 1.0) > 0.95
         assert signed[0] @ (0.0, 0.0, -1.0) > 0.8
 
-    def test_a_thumb_grasps_with_the_finger_that_it_meets(self, tmp_path):
+    @pytest.mark.parametrize("known", [True, False])
+    def test_a_thumb_grasps_with_the_finger_that_it_meets(self, tmp_path, known):
         parts, last = single_arm(end="")
+        ring, thumb, index = ("ring", "thumb", "index") if known else ("b", "c", "a")
         for name, y, z, axis in (
-            ("ring", -0.02, 0.03, 1), ("thumb", 0.0, -0.03, -1), ("index", 0.02, 0.03, 1)
+            (ring, -0.02, 0.03, 1), (thumb, 0.0, -0.03, -1), (index, 0.02, 0.03, 1)
         ):  # fmt: skip
             parts.link(name, 0.02, "0.06 0.01 0.01", "0.03 0 0")
             parts.joint(f"{name}_joint", last, name, f"0.05 {y} {z}", axis=f"0 {axis} 0",
                         limits=(0.0, 0.8))  # fmt: skip
         fingers = guess(parts, tmp_path).descriptor.fingers
-        assert fingers.links == ("thumb", "index")
+        assert fingers.links == (thumb, index if known else ring)
         assert fingers.opening_signs == (-1, 1)
         assert fingers.opening_axes[0][2] > 0.9
 
