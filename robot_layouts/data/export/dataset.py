@@ -21,7 +21,13 @@ from robot_layouts.core.commands import UsageError
 from robot_layouts.core.pages import plural
 from robot_layouts.core.progress import Progress as ProgressLine
 from robot_layouts.core.writing import PARTIAL, writing_errors, written_whole
-from robot_layouts.data.export.columns import ColumnReader, Columns, Credits, succeeded
+from robot_layouts.data.export.columns import (
+    ColumnReader,
+    Columns,
+    Credits,
+    DatasetWriter,
+    succeeded,
+)
 from robot_layouts.data.playing.command_options import (
     PictureSize,
     Players,
@@ -56,7 +62,6 @@ from tasks.engine.columns import OVERVIEW
 if TYPE_CHECKING:
     from robot_layouts.data.export.drawing import Drawing, DrawnEpisode
     from robot_layouts.data.export.shots import Shots
-    from robot_layouts.data.export.writer import DatasetWriter
     from robot_layouts.data.playing.executor import Executor
 FORMATS = ("lerobot", "robomimic")
 INSTALL = "pip install 'robot-layouts[export]'"
@@ -337,7 +342,7 @@ def export(
                     columns = work.columns(i, trajectory)
                     watch = _part(progress, i, len(columns) + 1, len(file))
                     drawn = draw(columns)
-                    writer.add(columns, drawn or (), watch, text=work.text(trajectory))
+                    writer.add(columns, drawn or (), watch, work.text(trajectory))
                     if drawn is not None and work.seen:
                         writer.note({"pictures_exact": drawn.exact})
                     episodes, steps = episodes + 1, steps + len(columns)
