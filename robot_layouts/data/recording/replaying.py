@@ -20,8 +20,7 @@ from robot_layouts.data.playing.command_options import (
     stoppable,
     tell,
 )
-from robot_layouts.data.playing.executor import Executor, play_all
-from robot_layouts.data.playing.in_process import InProcessExecutor
+from robot_layouts.data.playing.executor import Executor, InProcessExecutor, play_all
 from robot_layouts.data.playing.replay import (
     RecordedJob,
     Replayed,
