@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from layouts.commands import Page, Server
 from robot_layouts.core.cli import Folder, Seed
@@ -18,9 +17,6 @@ from robot_layouts.data.playing.command_options import (
 )
 from robots import TaskError
 from tasks.cell_options import CellOptions
-
-if TYPE_CHECKING:
-    pass
 
 TELEOP_FOLDER = Path("runs/teleop")
 

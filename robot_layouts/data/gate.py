@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from statistics import median
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.cli import Count, Seed
+from robot_layouts.core.commands import print_table
 from robot_layouts.core.progress import Progress
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.touching import ArmWatch
@@ -260,24 +261,10 @@ def check(task: str, *, seeds: Count = 20, first: Seed = 0, cell: CellOptions) -
     Raises:
         RobotLayoutsError: If the task cannot be made, or has no expert.
     """
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     so_far = Progress(work=f"check of {task}")
     found = check_task(task, seeds, first=first, tell=so_far.tell, **cell.making())
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("", "found", "needed", ""):
-        table.add_column(column)
-    for row in _rows(found):
-        table.add_row(*row)
-    console = Console(markup=False, highlight=False)
-    console.print(table)
+    rows = [(one.check, one.found, one.needed, "yes" if one.passed else "NO") for one in found]
+    print_table(("", "found", "needed", ""), rows)
     missing = [outcome.check for outcome in found if not outcome.passed]
     print(f"{task}: {'not yet: ' + ', '.join(missing) if missing else 'its scores are proofs'}")
     return 1 if missing else 0
-
-
-def _rows(found: list[Outcome]) -> Iterator[tuple[str, str, str, str]]:
-    for outcome in found:
-        yield outcome.check, outcome.found, outcome.needed, "yes" if outcome.passed else "NO"
