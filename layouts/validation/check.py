@@ -10,14 +10,6 @@ import numpy as np
 
 from layouts.arrangement import Arrangement
 from layouts.frames import TABLE_DEPTH, Rectangle, table_tops
-from layouts.validation.advice import (
-    NARROW,
-    to_be_reached,
-    to_leave_the_table,
-    to_stand_apart,
-    to_start_elsewhere,
-    to_touch_itself_no_more,
-)
 from layouts.validation.collisions import (
     Approach,
     Postures,
@@ -30,6 +22,7 @@ from layouts.validation.collisions import (
     touching,
 )
 from layouts.validation.findings import (
+    NARROW,
     Clearance,
     Finding,
     LinkPair,
@@ -39,6 +32,11 @@ from layouts.validation.findings import (
     length_text,
     links_text,
     reach_text,
+    to_be_reached,
+    to_leave_the_table,
+    to_stand_apart,
+    to_start_elsewhere,
+    to_touch_itself_no_more,
 )
 from layouts.validation.reach import Arm, Workspace
 from layouts.validation.report import Report

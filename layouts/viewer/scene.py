@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from layouts.frames import table_outlines
-from layouts.viewer.cell import LinkContact, ShownCell, Thing
-from layouts.viewer.text import node
+from layouts.viewer.cell import LinkContact, ShownCell, Thing, node
 from layouts.visuals import Visual, coarse, simplified
 from robot_layouts.core.figures import COLOURS
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
