@@ -21,6 +21,13 @@ from robot_layouts.core.commands import UsageError
 from robot_layouts.core.pages import plural
 from robot_layouts.core.progress import Progress as ProgressLine
 from robot_layouts.core.writing import PARTIAL, writing_errors, written_whole
+from robot_layouts.data.publishing.push import (
+    DatasetPush,
+    Repository,
+    Sharing,
+    checked_name,
+    report_push,
+)
 from robot_layouts.data.export.columns import (
     ColumnReader,
     Columns,
@@ -36,13 +43,6 @@ from robot_layouts.data.playing.command_options import (
 )
 from robot_layouts.data.playing.executor import ProcessExecutor
 from robot_layouts.data.point_clouds import Box, point_cloud
-from robot_layouts.data.publishing.push import (
-    DatasetPush,
-    Repository,
-    Sharing,
-    checked_name,
-    report_push,
-)
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory
@@ -454,12 +454,10 @@ class _Work:
             yield lambda columns: Drawing(task, columns, shots, last=last)
             return
         from robot_layouts.data.export.drawing import DrawingJob, draw_in_order
-        from robot_layouts.data.playing.replay import RecordedJob
 
         numbers = [i for i in range(len(file)) if wanted.include_failures or succeeded(file[i])]
         making = {"layout": wanted.layout, "robots": wanted.robots, "pictures": True}
-        about = RecordedJob.about(file, {i: i for i in numbers}, making)
-        job = DrawingJob(**about, shots=shots, last=last)
+        job = DrawingJob.of(file, {i: i for i in numbers}, making, shots=shots, last=last)
         episodes = draw_in_order(
             job, executor, numbers, folder, lambda n: progress(n, len(file)), tell
         )

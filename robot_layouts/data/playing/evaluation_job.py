@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from robot_layouts.data.playing.environment import environment
 from robot_layouts.data.playing.executor import Executor, play_all
+from robot_layouts.data.playing.replay import bytes_of
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.together import (
     EpisodePlayer,
@@ -97,14 +98,10 @@ def trace_of(states: States) -> StateTrace:
     about = (f"{name} {rows.dtype.str} {rows.shape[1:]}\n" for name, rows in entries.items())
     digest = sha256("".join(about).encode())
     kept: list[bytes] = []
-    for moment in np.concatenate([_bytes(rows) for rows in entries.values()], axis=1):
+    for moment in np.concatenate([bytes_of(rows) for rows in entries.values()], axis=1):
         digest.update(moment)
         kept.append(digest.digest()[:BYTES])
     return StateTrace(digest.hexdigest(), b64encode(b"".join(kept)).decode())
-
-
-def _bytes(rows: NDArray[np.float32]) -> NDArray[np.uint8]:
-    return np.ascontiguousarray(rows).reshape(len(rows), -1).view(np.uint8)
 
 
 def pictures_of(observation: Any) -> dict[str, Any]:
@@ -237,27 +234,22 @@ class _EvaluationPlay(EpisodesPlay[EvaluationJob]):
         for player in players:
             player.most = min(player.most, self._job.most_steps.get(player.seed, player.most))
         with torch.no_grad():
-            if not self._job.traced:
-                play_together(self._env, players)
-                return {player.seed: player.score for player in players}
-            if self._job.pictures is not None:
-                return self._watched(self._job.pictures, players)
-            played = states_together(self._env, players)
-        return {
-            player.seed: TracedScore(
-                **vars(player.score), trace=trace_of(states), environment=environment()
-            )
-            for player, states in zip(players, played, strict=True)
-        }
+            if self._job.traced:
+                return self._traced(self._job.pictures, players)
+            play_together(self._env, players)
+        return {player.seed: player.score for player in players}
 
-    def _watched(
-        self, pictures: WatchedPictures, players: Sequence[EpisodePlayer]
+    def _traced(
+        self, pictures: WatchedPictures | None, players: Sequence[EpisodePlayer]
     ) -> dict[int, Score]:
-        for player in players:
-            player.rehearsed = None  # without a look at its pictures
-        watch = PictureWatch(pictures, players)
-        played = states_together(self._env, players, watch)
-        about = {**environment(), "graphics": self._env.simulation.describe_graphics()}
+        watch, about = PictureWatch(pictures or WatchedPictures(), players), environment()
+        if pictures is None:
+            played = states_together(self._env, players)
+        else:
+            for player in players:
+                player.rehearsed = None  # without a look at its pictures
+            played = states_together(self._env, players, watch)
+            about = {**about, "graphics": self._env.simulation.describe_graphics()}
         return {
             player.seed: TracedScore(
                 **vars(player.score),
@@ -290,15 +282,13 @@ def scores_of(
             for single in one_by_one(event):
                 on_event(single)
                 if single.seed is not None and isinstance(single.result, Score):
-                    scores[single.seed] = _without_images(single.result)
+                    score = single.result
+                    keeps = isinstance(score, TracedScore) and score.images
+                    scores[single.seed] = replace(score, images={}) if keeps else score
             if event.error is not None:
                 seeds = [event.seed] if event.seed is None else job.together[event.seed]
                 _raise(event.error, seeds)
     return scores
-
-
-def _without_images(score: Score) -> Score:
-    return replace(score, images={}) if isinstance(score, TracedScore) else score
 
 
 def _raise(error: Exception, seeds: Sequence[int | None]) -> NoReturn:

@@ -157,9 +157,7 @@ def convert(
         found.kept += [seed for seed in places if seed in recorder.seeds]
         recorder.expect(missing)
         on_event(found, None)
-        job = ConvertJob(
-            **RecordedJob.about(file, places, cell), mode=mode, encoder=recorder.encoder
-        )
+        job = ConvertJob.of(file, places, cell, mode=mode, encoder=recorder.encoder)
         with closing(play_all(executor or InProcessExecutor(), job, missing)) as events:
             for event in events:
                 _note(found, event, recorder)

@@ -162,7 +162,7 @@ def replay_recording(
         if recorder is not None:
             recorder.expect(missing)
         encoder = None if recorder is None else recorder.encoder
-        job = ReplayJob(**RecordedJob.about(file, places, making), start=start, encoder=encoder)
+        job = ReplayJob.of(file, places, making, start=start, encoder=encoder)
         with closing(play_all(executor, job, missing)) as events:
             for event in events:
                 _note(summary, event, places, recorder)
