@@ -21,7 +21,7 @@ from robot_layouts.core.commands import UsageError
 from robot_layouts.core.pages import plural
 from robot_layouts.core.progress import Progress as ProgressLine
 from robot_layouts.core.writing import PARTIAL, writing_errors, written_whole
-from robot_layouts.data.publishing.push import (
+from robot_layouts.data.dataset.push import (
     DatasetPush,
     Repository,
     Sharing,
