@@ -23,7 +23,7 @@ _FOR_USERS = {
     "export": "robot_layouts.data.export.dataset:export_command",
     "data build": "robot_layouts.data.recipe_commands:build_command",
     "data recipe": "robot_layouts.data.recipe_commands:recipe_command",
-    "data push": "robot_layouts.data.dataset.push:push_command",
+    "data push": "robot_layouts.data.export.push:push_command",
     "report": "robot_layouts.data.dataset.report:report",
     "view": "robot_layouts.data.commands:view",
     "evaluate": "robot_layouts.data.commands:evaluate",

@@ -1,1 +1,1 @@
-"""Datasets as a whole: certified by replays, reported on one page, and pushed with a card."""
+"""Datasets as a whole: certified by replays, and reported on one page."""

@@ -21,19 +21,19 @@ from robot_layouts.core.commands import UsageError
 from robot_layouts.core.pages import plural
 from robot_layouts.core.progress import Progress as ProgressLine
 from robot_layouts.core.writing import PARTIAL, writing_errors, written_whole
-from robot_layouts.data.dataset.push import (
-    DatasetPush,
-    Repository,
-    Sharing,
-    checked_name,
-    report_push,
-)
 from robot_layouts.data.export.columns import (
     ColumnReader,
     Columns,
     Credits,
     DatasetWriter,
     succeeded,
+)
+from robot_layouts.data.export.push import (
+    DatasetPush,
+    Repository,
+    Sharing,
+    checked_name,
+    report_push,
 )
 from robot_layouts.data.playing.command_options import (
     PictureSize,

@@ -248,7 +248,7 @@ def card(data: Described, name: str, licence: str | None) -> str:
     """
     mode = data.control_mode
     text = fragment(
-        "robot_layouts.data.dataset/card.md.jinja",
+        "robot_layouts.data.export/card.md.jinja",
         data=data,
         name=name,
         licence=licence,
