@@ -113,9 +113,9 @@ def check_task(
         _touching(solved),
         _stages(won, dict(cls.stages)),
         _reward(won, dense=dense),
-        _share("random actions solve", sum(random), seeds, "none", not any(random)),
-        _share(
-            "unseeing, solves", sum(blind), len(blind), f"less than {BLIND:.0%}",
+        Outcome("random actions solve", f"{sum(random)} of {seeds}", "none", not any(random)),
+        Outcome(
+            "unseeing, solves", f"{sum(blind)} of {len(blind)}", f"less than {BLIND:.0%}",
             bool(blind) and sum(blind) < BLIND * len(blind),
         ),
     ]  # fmt: skip
@@ -198,10 +198,6 @@ def _solved(played: dict[int, PlayedOnce], seeds: range) -> Outcome:
     words = f"{count} of {len(seeds)}" + (f", not {', '.join(failed)}" if failed else "")
     needed = f"at least {SOLVED:.0%}"
     return Outcome("expert solves", words, needed, count >= SOLVED * len(seeds))
-
-
-def _share(check: str, count: int, of: int, needed: str, passed: bool) -> Outcome:
-    return Outcome(check, f"{count} of {of}", needed, passed)
 
 
 def _touching(solved: dict[int, PlayedOnce]) -> Outcome:

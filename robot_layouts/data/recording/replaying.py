@@ -149,7 +149,7 @@ def replay_recording(
                 f"{file.path} does not name another seed for each episode, by which workers and"
                 " recordings know them; play it without --workers and --out"
             )
-        places = dict(zip(*[range(len(file.seeds[:count]))] * 2, strict=True))
+        places = {place: place for place in range(len(file.seeds[:count]))}
     summary, recorder = ReplaySummary(len(places)), None
     if folder is not None:
         making |= {"obs_mode": obs_mode, **observing}
