@@ -35,7 +35,7 @@ from benchmarks.records import (
     write_record,
 )
 from robot_layouts.core.portable import FIXED, GLIBC, NUMPY, portable_variables
-from robot_layouts.data.playing.picture_digests import picture_digest, pictures_of
+from robot_layouts.data.playing.evaluation_job import picture_digest, pictures_of
 from robot_layouts.experts import find_expert
 from robot_layouts.simulation import Camera
 from robots import DescriptorError, SimulationError, TaskError

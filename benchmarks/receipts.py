@@ -25,7 +25,7 @@ from benchmarks.asking import Setting, answers_under
 from benchmarks.records import DOCS
 from robot_layouts.core.portable import portable_variables
 from robot_layouts.data import evaluate
-from robot_layouts.data.playing.picture_digests import pictures_of
+from robot_layouts.data.playing.evaluation_job import pictures_of
 from robot_layouts.data.receipts.receipt import Receipt
 from robot_layouts.data.receipts.verification import verify
 from robots import SimulationError

@@ -163,9 +163,9 @@ class Page(Server):
         Raises:
             RobotLayoutsError: If the page cannot be served or saved.
         """
+        from layouts.viewer.cell import printable
         from layouts.viewer.page import NO_SLIDERS, save_html, serve
         from layouts.viewer.server import import_viser
-        from layouts.viewer.text import printable
 
         import_viser()
         try:

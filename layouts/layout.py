@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 from layouts.arrangement import Arrangement
 from layouts.description import describe
+from robot_layouts.core.figures import save_figure
 from robot_layouts.core.writing import write_whole
+from robots import LayoutError
 from robots.named import written_robot
 
 if TYPE_CHECKING:
@@ -265,9 +267,9 @@ class Layout(Arrangement):
             LayoutError: If the ending names no supported format, or the table is no rectangle.
             MissingPackageError: If matplotlib is not installed.
         """
-        from layouts.preview import preview
+        from layouts.preview import draw
 
-        return preview(self, path, table)
+        return save_figure(lambda: draw(self, table), path, "preview", LayoutError)
 
     def validate(
         self,
@@ -303,8 +305,6 @@ class Layout(Arrangement):
             DescriptorError: If the robots' descriptors contradict their URDFs.
             MissingPackageError: If python-fcl is not installed.
         """
-        from layouts.validation import validate
+        from layouts.validation.check import LayoutCheck
 
-        return validate(
-            self, targets=targets, samples=samples, table=table, seed=seed, workspaces=workspaces
-        )
+        return LayoutCheck(self, targets, samples, table, seed).run(workspaces)

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import io
 import math
-import os
 from collections.abc import Mapping, Sequence
 from html import escape
 from itertools import accumulate
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from layouts.description import action_text, decimal, facing_text, headline
 from layouts.frames import Rectangle, table_tops
-from robot_layouts.core.figures import COLOURS, FAINT, INK, blank_figure, save_figure
+from robot_layouts.core.figures import COLOURS, FAINT, INK, blank_figure
 from robot_layouts.core.quoting import cut
 from robot_layouts.kinematics.quaternions import forward, yaw_degrees
-from robots import LayoutError, MissingPackageError
+from robots import MissingPackageError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,28 +41,6 @@ LONGEST_NAME, LONGEST_ROBOT = 16, 24  # letters
 TILE = 241  # grid points per side, from which the overlap is drawn
 
 
-def preview(
-    layout: Arrangement, path: str | os.PathLike[str], table: Rectangle | None = None
-) -> Path:
-    """Draw a layout from above and save the picture, whole or not at all.
-
-    Neither robot files nor a graphics driver are needed.
-
-    Args:
-        layout: What to draw.
-        path: Where to save; the ending chooses the format (.png, .pdf or .svg).
-        table: Outline of a table, as x_min, y_min, x_max, y_max (m).
-
-    Returns:
-        The path of the picture.
-
-    Raises:
-        LayoutError: If the ending names no supported format, or the table is no rectangle.
-        MissingPackageError: If matplotlib is not installed.
-    """
-    return save_figure(lambda: draw(layout, table), path, "preview", LayoutError)
-
-
 def layout_html(layout: Arrangement) -> str:
     """Return what notebooks show of a layout: an SVG; its table if that cannot be drawn.
 
@@ -86,7 +62,7 @@ def layout_html(layout: Arrangement) -> str:
 
 
 def draw(layout: Arrangement, table: Rectangle | None = None) -> Figure:
-    """Return the figure that `preview` saves.
+    """Return the figure that `layouts.Layout.preview` saves.
 
     Args:
         layout: What to draw.

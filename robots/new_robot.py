@@ -10,7 +10,7 @@ from typing import Any
 from robot_layouts.core.cli import Folder, main_of
 from robot_layouts.core.commands import notice, start
 from robot_layouts.core.errors import DescriptorError
-from robot_layouts.core.new_files import check_module_name, write_new
+from robot_layouts.core.writing import check_module_name, write_new
 from robots.assets.locator import LocalUrdf
 from robots.data_module import write_module
 from robots.from_urdf import guess_descriptor

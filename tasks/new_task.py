@@ -21,8 +21,8 @@ import numpy as np
 from layouts import Layout, face_to_face, ring, single
 from robot_layouts.core.cli import Folder, by_name, main_of
 from robot_layouts.core.commands import notice, start
-from robot_layouts.core.new_files import check_module_name, write_new
 from robot_layouts.core.paths import absolute
+from robot_layouts.core.writing import check_module_name, write_new
 from robot_layouts.kinematics.rotations import rotate
 from robots import RobotDescriptor, TaskError
 from robots.named import is_path, named_robot

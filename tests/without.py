@@ -16,7 +16,7 @@ from types import ModuleType
 ROOMS = ("robots", "objects", "layouts", "tasks", "robot_layouts")
 # What needs usd-core at import, and what needs MuJoCo Warp.
 NEED_MORE = (
-    *("layouts.export.usd", "layouts.export.usd_prims"),
+    "layouts.export.usd",
     *(
         f"robot_layouts.simulation.mujoco_warp.{name}"
         for name in ("contacts", "library", "linkages", "simulation", "worlds")

@@ -77,7 +77,7 @@ def _directives(standing: Standing, urdf: Path, base: str) -> Iterator[dict[str,
     turn = [math.degrees(angle) for angle in quaternion_rpy(placement.base_quaternion)]
     yield {
         "add_weld": {
-            "parent": "world",
+            "parent": WORLD,
             "child": f"{standing.place}::{base}",
             "X_PC": {
                 "translation": list(placement.base_position),

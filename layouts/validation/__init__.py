@@ -1,6 +1,5 @@
 """Checks of a layout before anything moves, from the robots' real collision shapes."""
 
-from layouts.validation.check import validate
 from layouts.validation.findings import Clearance, Finding, LinkPair, SharedWorkspace, TargetReach
 from layouts.validation.report import Report
 
@@ -11,5 +10,4 @@ __all__ = [
     "Report",
     "SharedWorkspace",
     "TargetReach",
-    "validate",
 ]

@@ -10,14 +10,6 @@ import numpy as np
 
 from layouts.arrangement import Arrangement
 from layouts.frames import TABLE_DEPTH, Rectangle, table_tops
-from layouts.validation.advice import (
-    NARROW,
-    to_be_reached,
-    to_leave_the_table,
-    to_stand_apart,
-    to_start_elsewhere,
-    to_touch_itself_no_more,
-)
 from layouts.validation.collisions import (
     Approach,
     Postures,
@@ -30,6 +22,7 @@ from layouts.validation.collisions import (
     touching,
 )
 from layouts.validation.findings import (
+    NARROW,
     Clearance,
     Finding,
     LinkPair,
@@ -39,6 +32,11 @@ from layouts.validation.findings import (
     length_text,
     links_text,
     reach_text,
+    to_be_reached,
+    to_leave_the_table,
+    to_stand_apart,
+    to_start_elsewhere,
+    to_touch_itself_no_more,
 )
 from layouts.validation.reach import Arm, Workspace
 from layouts.validation.report import Report
@@ -54,33 +52,16 @@ SHALLOW = 0.005  # m; a folded arm's hulls overlap by less where its links do no
 LIMIT_TOLERANCE = 1e-4  # rad or m; limits and keyframes are written with four digits
 
 
-def validate(
-    layout: Arrangement,
-    *,
-    targets: Targets = (),
-    samples: int = 20,
-    table: Rectangle | None = None,
-    seed: int = 0,
-    workspaces: bool = True,
-) -> Report:
-    """Check a layout; see `layouts.Layout.validate`."""
-    if not (isinstance(samples, int) and samples >= 0):
-        raise LayoutError(f"samples is {samples!r}; it must be an integer of 0 or more")
-    return _LayoutCheck(layout, named_targets(targets), samples, table, seed).run(workspaces)
-
-
-class _LayoutCheck:
-    """One check of one layout, with everything loaded that it needs."""
+class LayoutCheck:
+    """One check of one layout, with everything loaded that it needs; see `Layout.validate`."""
 
     def __init__(
-        self,
-        layout: Arrangement,
-        targets: Mapping[str, tuple[float, ...]],
-        samples: int,
-        table: Rectangle | None,
-        seed: int,
+        self, layout: Arrangement, targets: Targets, draws: int, table: Rectangle | None, seed: int
     ) -> None:
-        self._layout, self._targets, self._draws = layout, targets, samples
+        """Load the robots' files, and refuse arguments that are invalid."""
+        if not (isinstance(draws, int) and draws >= 0):
+            raise LayoutError(f"samples is {draws!r}; it must be an integer of 0 or more")
+        self._layout, self._targets, self._draws = layout, named_targets(targets), draws
         self._tops = table_tops(layout.frame_poses, table)
         self._progress = Progress(work="checking the layout")
         self._unread: dict[str, RobotLayoutsError] = {}
@@ -95,11 +76,11 @@ class _LayoutCheck:
         }
         random = np.random.default_rng(seed)
         self._robots = {
-            name: stand(name, p.base_pose, self._models[name], noisy_postures(p, samples, random))
+            name: stand(name, p.base_pose, self._models[name], noisy_postures(p, draws, random))
             for name, p in self._checked.items()
         }
         self._surfaces = {
-            name: fixed(name, slab_hull(np.array(top), TABLE_DEPTH, name), samples + 1)
+            name: fixed(name, slab_hull(np.array(top), TABLE_DEPTH, name), draws + 1)
             for name, top in self._tops.items()
         }
 
@@ -112,6 +93,7 @@ class _LayoutCheck:
                 self._unread[name] = error
 
     def run(self, workspaces: bool) -> Report:
+        """Return what is found; see `layouts.Layout.validate`."""
         findings = [*self._unreadable(), *self._limits(), *self._self_collisions()]
         clearances: list[Clearance] = []
         for one, other, pairs in self._neighbours():

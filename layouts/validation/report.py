@@ -23,6 +23,7 @@ from layouts.validation.findings import (
     reach_text,
 )
 from robot_layouts.core.figures import COLOURS, FAINT, INK, blank_figure, save_figure
+from robot_layouts.core.pages import plural
 from robot_layouts.core.quoting import cut
 from robot_layouts.kinematics.rotations import Floats
 from robots import LayoutError
@@ -99,11 +100,9 @@ class Report:
 
 def _lines(report: Report) -> Iterator[str]:
     serious = sum(finding.serious for finding in report.findings)
-    warnings = len(report.findings) - serious
     verdict = "ok" if report.ok else "not ok"
-    counts = [_count(serious, "problem")] * bool(serious) + [_count(warnings, "warning")] * bool(
-        warnings
-    )
+    found = {"problem": serious, "warning": len(report.findings) - serious}
+    counts = [plural(count, what) for what, count in found.items() if count]
     yield f"{verdict}: {headline(report.layout)}{''.join(f', {text}' for text in counts)}"
     yield (
         f"looked at the keyframes and {report.draws} draws of joint noise"
@@ -115,10 +114,6 @@ def _lines(report: Report) -> Iterator[str]:
     yield from _section("distances (at the keyframes; with joint noise)", _distances(report))
     yield from _section("tool centre points reach", _spaces(report))
     yield from _section("targets", _targets(report))
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' * (number != 1)}"
 
 
 def _section(title: str, rows: Iterator[str]) -> Iterator[str]:

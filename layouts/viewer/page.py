@@ -14,11 +14,10 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from layouts.viewer.cell import LinkContact, ShownCell, ShownMotion
+from layouts.viewer.cell import LinkContact, ShownCell, ShownMotion, Text, as_html, printable
 from layouts.viewer.guard import is_loopback, policy
 from layouts.viewer.scene import OVERLAYS, CellScene
 from layouts.viewer.server import ViewerError, serving
-from layouts.viewer.text import Text, as_html, printable
 from robot_layouts.core.commands import LOOPBACK
 from robot_layouts.core.writing import write_whole
 from robot_layouts.kinematics.rotations import Floats

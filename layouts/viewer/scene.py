@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from layouts.frames import table_outlines
-from layouts.viewer.cell import LinkContact, ShownCell, Thing
-from layouts.viewer.text import node
+from layouts.viewer.cell import LinkContact, ShownCell, Thing, node
 from layouts.visuals import Visual, coarse, simplified
 from robot_layouts.core.figures import COLOURS
 from robot_layouts.kinematics.rotations import Floats, quaternion_of
@@ -217,23 +216,21 @@ class CellScene:
         angles = np.linspace(0, 2 * math.pi, CIRCLE_POINTS)
         ring = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], 1) * reach
         ring[:, 2] = LIFT
+        self._draw_line(f"/{name}/reach/level/circle", ring, colour)
+
+    def _draw_ways(self, name: str, colour: tuple[int, int, int]) -> None:
+        for number, line in enumerate(self._cell.ways.get(name, ())):
+            self._draw_line(node("(ways)", name, str(number)), line, colour)
+
+    def _draw_line(self, path: str, points: Floats, colour: tuple[int, int, int]) -> None:
+        """Draw a line through points, (n, 3) (m)."""
         self._api.add_line_segments(
-            f"/{name}/reach/level/circle",
-            points=np.stack([ring[:-1], ring[1:]], 1),
+            path,
+            points=np.stack([points[:-1], points[1:]], 1),
             colors=colour,
             thickness=3.0,
             thickness_units="screen",
         )
-
-    def _draw_ways(self, name: str, colour: tuple[int, int, int]) -> None:
-        for number, line in enumerate(self._cell.ways.get(name, ())):
-            self._api.add_line_segments(
-                node("(ways)", name, str(number)),
-                points=np.stack([line[:-1], line[1:]], 1).astype(np.float32),
-                colors=colour,
-                thickness=3.0,
-                thickness_units="screen",
-            )
 
     def _draw_floor(self) -> None:
         """Draw a grid below the lowest base, and the tables of the layout's frames."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import difflib
 import os
 from collections.abc import Iterable
@@ -19,6 +20,10 @@ class RobotLayoutsError(Exception):
         """Return the message as written (``KeyError`` would show its repr), but never pages."""
         return shortened(str(self.args[0])) if self.args else ""
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle by what it holds, so that worker processes can send it home."""
+        return (copyreg.__newobj__, (type(self), *self.args), vars(self))  # pyright: ignore
+
 
 class UnknownNameError(RobotLayoutsError, KeyError):
     """A name that is not in a catalogue; the message names the closest match and the choices."""
@@ -34,10 +39,6 @@ class UnknownNameError(RobotLayoutsError, KeyError):
         """
         self.kind, self.name, self.choices = kind, name, tuple(choices)
         super().__init__(unknown_name_message(kind, name, self.choices, hint))
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by message, so that worker processes can send the error home."""
-        return (_rebuild_unknown_name, (self.args[0], self.kind, self.name, self.choices))
 
 
 class DescriptorError(RobotLayoutsError, ValueError):
@@ -73,7 +74,7 @@ class UnreadableFileError(RobotLayoutsError, OSError):
         self.filename, self.strerror, self.errno = path, reason, number
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by what it was composed of, so that worker processes can send it home."""
+        """Pickle by what it was composed of: an ``OSError`` holds that apart."""
         return (type(self), (self.filename, self.strerror, self.errno))
 
 
@@ -99,10 +100,6 @@ class NoPlanError(RobotLayoutsError, RuntimeError):
         """
         super().__init__(message)
         self.reason, self.missing = reason, missing
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by what it was composed of, so that worker processes can send it home."""
-        return (type(self), (self.args[0], self.reason, self.missing))
 
 
 class SimulationError(RobotLayoutsError, RuntimeError):
@@ -161,14 +158,6 @@ def _alike(name: object, choices: Iterable[str], most: int, cutoff: float) -> li
         return []
     found = difflib.get_close_matches(text.lower(), by_lower, n=most, cutoff=cutoff)
     return [by_lower[choice] for choice in found]
-
-
-def _rebuild_unknown_name(
-    message: str, kind: str, name: object, choices: tuple[str, ...]
-) -> UnknownNameError:
-    error = UnknownNameError(kind, name, choices)
-    error.args = (message,)
-    return error
 
 
 def missing_name(module: str, name: str, names: Iterable[str]) -> AttributeError:

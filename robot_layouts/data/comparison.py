@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.cli import Count, Seed
-from robot_layouts.core.commands import printable
+from robot_layouts.core.commands import print_table, printable
 from robot_layouts.core.progress import Progress
 from robot_layouts.experts import find_expert
 from robot_layouts.simulation.backend import CLONING, SIMULATORS
@@ -103,13 +103,6 @@ def compare_command(
     Raises:
         RobotLayoutsError: If the task cannot be made, or has no expert.
     """
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("seed", "steps", *SIMULATORS, "farthest apart", "", "1 mm after"):
-        table.add_column(column)
     making: dict[str, Any] = {"obs_mode": "none", **cell.making()}
     envs = {name: make(task, simulator=name, **making) for name in SIMULATORS}
     found, line = list[Compared](), Progress(episodes, "episodes")
@@ -119,12 +112,11 @@ def compare_command(
             actions = _at_random(planner, number) if random else _planned(planner, task, number)
             if actions is not None:
                 found.append(compare(envs, number, actions))
-                table.add_row(*_row(found[-1]))
             line.update(number - seed + 1, "comparing")
     for env in envs.values():
         env.close()
-    console = Console(markup=False, highlight=False)
-    console.print(table)
+    heads = ("seed", "steps", *SIMULATORS, "farthest apart", "", "1 mm after")
+    print_table(heads, map(_row, found))
     for name in SIMULATORS:
         print(printable(f"{name}: {sum(c.solved[name] for c in found)} of {len(found)} solved"))
     return 0

@@ -13,7 +13,12 @@ from typing import TYPE_CHECKING, Any
 from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.writing import writing_errors
 from robot_layouts.data.actors import EXPERT
-from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore, scores_of
+from robot_layouts.data.playing.evaluation_job import (
+    EvaluationJob,
+    TracedScore,
+    WatchedPictures,
+    scores_of,
+)
 from robot_layouts.data.playing.executor import (
     Executor,
     checked_seeds,
@@ -21,7 +26,6 @@ from robot_layouts.data.playing.executor import (
     seed_lines,
     wait_lines,
 )
-from robot_layouts.data.playing.picture_digests import WatchedPictures
 from robot_layouts.data.playing.scheduler import EPISODE_SECONDS, Event
 from robot_layouts.data.playing.served.policy import ServedPolicy
 from robot_layouts.data.playing.shared_policy import SharedPolicy

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from statistics import median
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.cli import Count, Seed
+from robot_layouts.core.commands import print_table
 from robot_layouts.core.progress import Progress
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.touching import ArmWatch
@@ -112,9 +113,9 @@ def check_task(
         _touching(solved),
         _stages(won, dict(cls.stages)),
         _reward(won, dense=dense),
-        _share("random actions solve", sum(random), seeds, "none", not any(random)),
-        _share(
-            "unseeing, solves", sum(blind), len(blind), f"less than {BLIND:.0%}",
+        Outcome("random actions solve", f"{sum(random)} of {seeds}", "none", not any(random)),
+        Outcome(
+            "unseeing, solves", f"{sum(blind)} of {len(blind)}", f"less than {BLIND:.0%}",
             bool(blind) and sum(blind) < BLIND * len(blind),
         ),
     ]  # fmt: skip
@@ -199,10 +200,6 @@ def _solved(played: dict[int, PlayedOnce], seeds: range) -> Outcome:
     return Outcome("expert solves", words, needed, count >= SOLVED * len(seeds))
 
 
-def _share(check: str, count: int, of: int, needed: str, passed: bool) -> Outcome:
-    return Outcome(check, f"{count} of {of}", needed, passed)
-
-
 def _touching(solved: dict[int, PlayedOnce]) -> Outcome:
     touched = {seed: played.touching for seed, played in solved.items() if played.touching}
     words = "; ".join(f"seed {seed}: {what}" for seed, what in [*touched.items()][:1]) or "none"
@@ -260,24 +257,10 @@ def check(task: str, *, seeds: Count = 20, first: Seed = 0, cell: CellOptions) -
     Raises:
         RobotLayoutsError: If the task cannot be made, or has no expert.
     """
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     so_far = Progress(work=f"check of {task}")
     found = check_task(task, seeds, first=first, tell=so_far.tell, **cell.making())
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("", "found", "needed", ""):
-        table.add_column(column)
-    for row in _rows(found):
-        table.add_row(*row)
-    console = Console(markup=False, highlight=False)
-    console.print(table)
+    rows = [(one.check, one.found, one.needed, "yes" if one.passed else "NO") for one in found]
+    print_table(("", "found", "needed", ""), rows)
     missing = [outcome.check for outcome in found if not outcome.passed]
     print(f"{task}: {'not yet: ' + ', '.join(missing) if missing else 'its scores are proofs'}")
     return 1 if missing else 0
-
-
-def _rows(found: list[Outcome]) -> Iterator[tuple[str, str, str, str]]:
-    for outcome in found:
-        yield outcome.check, outcome.found, outcome.needed, "yes" if outcome.passed else "NO"

@@ -9,14 +9,14 @@ from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.core.importing import optional
 from robot_layouts.core.writing import PARTIAL, written_whole
 from robot_layouts.simulation.rendering import Cameras, drawing_problem
-from robots import MissingPackageError, RecordingError
+from robots import RecordingError
 from tasks import TaskEnv
 from tasks.engine.columns import overview
 from tasks.episode import Episode, play
@@ -116,16 +116,10 @@ def open_video(path: Path, frames_per_second: float) -> Generator[Callable[[Pict
         RecordingError: If the file cannot be written.
     """
     partial = path.with_name(f"{path.stem}.{os.getpid()}{PARTIAL}{path.suffix}")
+    imageio = optional("imageio.v2", "videos need imageio", "video")
+    settings = {"fps": frames_per_second, "quality": 8, "macro_block_size": 16}
     with (
         written_whole(path, RecordingError, partial=partial),
-        _writer(partial, frames_per_second) as writer,
+        imageio.get_writer(partial, **settings) as writer,
     ):
         yield writer.append_data
-
-
-def _writer(path: Path, frames_per_second: float) -> Any:
-    try:
-        import imageio.v2 as imageio
-    except ImportError:
-        raise MissingPackageError(f"videos need imageio: {INSTALL}") from None
-    return imageio.get_writer(path, fps=frames_per_second, quality=8, macro_block_size=16)

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from robot_layouts.core.disk_cache import cached
 from robot_layouts.core.errors import AssetError
 from robot_layouts.core.importing import optional
+from robot_layouts.core.paths import cached
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.kinematics.tree import Tree
 from robots.bodies.allowed import LinkPair, read_allowed_pairs

@@ -17,9 +17,9 @@ from functools import lru_cache
 from typing import Any
 from urllib.parse import unquote
 
-from robot_layouts.core.disk_cache import cached
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import read_regular
+from robot_layouts.core.paths import cached
 from robots.urdf.paths import is_allowed
 from robots.urdf.text import parse_xml
 

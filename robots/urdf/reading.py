@@ -18,8 +18,8 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 import numpy as np
 
-from robot_layouts.core.disk_cache import cached
 from robot_layouts.core.errors import AssetError
+from robot_layouts.core.paths import cached
 from robot_layouts.kinematics.rotations import Floats, rpy_pose
 from robots.urdf.checks import expect_drivable, expect_readable, sizes_of
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel, UrdfShape
@@ -48,7 +48,7 @@ def model_of(urdf: Path) -> UrdfModel:
 def read_model(xml: bytes, urdf: str) -> UrdfModel:
     """Return the tree that a URDF describes; the same contents are read once in a process.
 
-    Those of a URDF in the local copy are read once altogether; see `robot_layouts.core.disk_cache`.
+    Those of a URDF in the local copy are read once altogether; see `robot_layouts.core.paths`.
 
     Args:
         xml: The URDF's contents.

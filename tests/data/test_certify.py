@@ -11,7 +11,7 @@ import tasks
 from layouts import face_to_face
 from robot_layouts.__main__ import main
 from robot_layouts.data.dataset.certificate import RecordingCertificate, certify, sentences
-from robot_layouts.data.playing.in_process import InProcessExecutor
+from robot_layouts.data.playing.executor import InProcessExecutor
 from robot_layouts.data.playing.replay import first_difference
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Recording

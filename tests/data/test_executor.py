@@ -16,12 +16,12 @@ import torch
 
 import robot_layouts.data.playing.scheduler
 from robot_layouts.data.playing.executor import (
+    InProcessExecutor,
     ProcessExecutor,
     WorkerError,
     choose_executor,
     play_all,
 )
-from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.playing.scheduler import Event
 from robots import TaskError
 from tests.data.plays import (

@@ -259,7 +259,8 @@ def test_full_video_files_are_followed_by_others(tmp_path):
         ) as writer:  # fmt: skip
             for i, trajectory in enumerate(file):
                 pictures = DrawnEpisode(dict([flat("a", i), flat("b", 9 * i)]), True)
-                writer.add(reader.read(trajectory), pictures, text="stop" if i == 1 else None)
+                text = "stop" if i == 1 else None
+                writer.add(reader.read(trajectory), pictures, lambda _: None, text)
     rows = pq.read_table(tmp_path / "out/meta/episodes").to_pydict()
     for camera in "ab":
         key = f"videos/observation.images.{camera}"

@@ -222,7 +222,7 @@ def test_full_files_are_followed_by_others(recording, tmp_path):
             tmp_path, reader, task_text="go", fps=20, origin={}, limits=limits
         ) as writer:
             for trajectory in [*file, file[0]]:
-                writer.add(reader.read(trajectory))
+                writer.add(reader.read(trajectory), (), lambda _: None, None)
     names = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("data/*/*"))
     assert names == [f"data/chunk-00{c}/file-00{f}.parquet" for c in (0, 1) for f in (0, 1)]
     found = frames(tmp_path)

@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 from robot_layouts.__main__ import main
-from robot_layouts.data.publishing.card import licence_for
-from robot_layouts.data.publishing.described import Described, describe
+from robot_layouts.data.export.described import Described, describe, licence_for
 from robot_layouts.data.reading import hub as hub_reading
 from robot_layouts.data.reading.hub import HubError, local_place
 from robot_layouts.data.reading.recording import Recording

@@ -15,7 +15,7 @@ import torch
 import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate
-from robot_layouts.data.playing.picture_digests import PictureTrace
+from robot_layouts.data.playing.evaluation_job import PictureTrace
 from robot_layouts.data.receipts import Receipt, ReceiptError
 from robot_layouts.data.receipts.pictures import kept, pictures_folder
 from robot_layouts.data.receipts.provenance import describe_making

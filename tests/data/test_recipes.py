@@ -14,7 +14,7 @@ import yaml
 
 import robot_layouts.data as data
 from robot_layouts.__main__ import main
-from robot_layouts.data.recipes.recipe import load_recipe, recipe_text
+from robot_layouts.data.recipe import load_recipe, recipe_text
 from robot_layouts.experts import register_expert
 from robots import TaskError
 from tasks import Randomization

@@ -22,9 +22,13 @@ from layouts.commands import Server
 from robot_layouts.__main__ import main
 from robot_layouts.data.playing.served.client import pack, unpack
 from robot_layouts.data.serving import client
-from robot_layouts.data.serving.client import RemoteEnv, RemoteTaskError
+from robot_layouts.data.serving.client import (
+    RemoteEnv,
+    RemoteTaskError,
+    read_space,
+    written_space,
+)
 from robot_layouts.data.serving.server import MOST_BYTES, Admission, serve
-from robot_layouts.data.serving.world import read_space, written_space
 from robot_layouts.simulation.rendering import vulkan_problem
 from robots import TaskError
 from tasks.interfaces.gymnasium import info_row, row

@@ -16,10 +16,14 @@ import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate, record
 from robot_layouts.data.playing.policies import find_policy
-from robot_layouts.data.playing.shared_policy import SharedPolicy, save_policy
+from robot_layouts.data.playing.shared_policy import (
+    SharedPolicy,
+    read_tensors,
+    save_policy,
+    write_tensors,
+)
 from robot_layouts.data.reading.hub import HubError
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.reading.tensors import read_tensors, write_tensors
 from robot_layouts.data.receipts import Receipt, verify
 from robots import TaskError, UnreadableFileError
 from tests.data.writable_hub import TOKEN, WritableHub

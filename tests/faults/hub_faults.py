@@ -176,7 +176,7 @@ def _hub(folder: Path) -> Iterator[WritableHub]:
 
 
 def _push(folder: Path | None = None) -> str:
-    from robot_layouts.data.publishing.push import DatasetPush, Sharing
+    from robot_layouts.data.export.push import DatasetPush, Sharing
 
     return DatasetPush.of(folder or _recorded(), NAME, Sharing())()
 

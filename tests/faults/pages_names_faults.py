@@ -35,7 +35,7 @@ def faults() -> Iterator[Fault]:
 
 
 def _name(folder: Path, place: str, name: str) -> str:
-    from layouts.viewer.text import printable
+    from layouts.viewer.cell import printable
     from tests.layouts.guests import Guest, site, small_cell
 
     names = {"link": {"lower": name}, "joint": {"elbow": name}}.get(place, {})
@@ -81,8 +81,8 @@ def _plain(message: dict[str, Any]) -> str:
 
 
 def _saved_name(folder: Path, name: str) -> str:
+    from layouts.viewer.cell import printable
     from layouts.viewer.page import NO_SLIDERS, save_html
-    from layouts.viewer.text import printable
     from tests.layouts.guests import small_cell
 
     pages = []
@@ -120,7 +120,7 @@ def _paths(folder: Path) -> str:
 
 def _file(folder: Path, name: str) -> str:
     from layouts import single
-    from layouts.viewer.text import as_html, printable
+    from layouts.viewer.cell import as_html, printable
 
     (folder / name).write_text(single({"arm": "so100"}).to_yaml())
     done = run_command("layouts", "view", str(folder / name), "--html", str(folder / "p.html"))

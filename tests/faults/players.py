@@ -65,7 +65,7 @@ class Nobody:
     def run(self, prepare: Any, seeds: Any) -> Any:
         """Play, after a fashion."""
         from robot_layouts.core.processes.start import WorkerError
-        from robot_layouts.data.playing.in_process import InProcessExecutor
+        from robot_layouts.data.playing.executor import InProcessExecutor
         from robot_layouts.data.playing.scheduler import Event
 
         if self.what == "forgets one":

@@ -144,7 +144,7 @@ def faults() -> Iterator[Fault]:
 def _make(folder: Path, *words: str) -> int:
     """Build the folder's recipe here; returns the exit code of the command."""
     from robot_layouts.data.playing.command_options import Players
-    from robot_layouts.data.recipes.build import build_command
+    from robot_layouts.data.recipe_commands import build_command
 
     only = {"only": words} if words else {}
     players = Players(workers=0)  # no module but ours is named, or the command is run
@@ -271,7 +271,7 @@ _KEEP = "include_failures: true"
 
 
 def _recipe_of(folder: Path, make: Callable[[Path], object]) -> None:
-    from robot_layouts.data.recipes.build import recipe_command
+    from robot_layouts.data.recipe_commands import recipe_command
 
     make(folder / "recording")
     try:

@@ -7,8 +7,8 @@ import viser
 
 from benchmarks.teleop import PATIENCE, SOFTWARE_WEBGL, running_browser, served
 from layouts.__main__ import main
+from layouts.viewer.cell import printable
 from layouts.viewer.page import save_html
-from layouts.viewer.text import printable
 from tests.layouts.guests import site, small_cell
 from tests.layouts.hostile_names import HOSTILE_NAMES
 from tests.layouts.hostile_site import ATTACK, NOTHING, hostile_site

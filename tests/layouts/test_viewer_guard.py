@@ -11,10 +11,10 @@ import msgspec
 import pytest
 
 from layouts.viewer import ViewerError
+from layouts.viewer.cell import as_html, node, printable
 from layouts.viewer.guard import REFUSAL, Guard
 from layouts.viewer.page import NO_SLIDERS, save_html
 from layouts.viewer.server import serving
-from layouts.viewer.text import as_html, node, printable
 from tests.layouts.guests import (
     WEBSOCKET,
     Guest,

@@ -11,8 +11,8 @@ import fcl
 import numpy as np
 import pytest
 
-from robot_layouts.core.disk_cache import FOLDER, cached
 from robot_layouts.core.errors import AssetError
+from robot_layouts.core.paths import FOLDER, cached
 from robot_layouts.kinematics.rotations import Floats
 from robots.bodies.hulls import Hull, read_hulls
 from robots.urdf.mesh_files import binary_stl, has_body

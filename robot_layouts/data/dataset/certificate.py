@@ -329,7 +329,7 @@ def certify(
     with open_recording(path, task_id) as file:
         seeds = _seeds_of(file)
         places = {seed: place for place, seed in enumerate(seeds)}
-        job = CertifyJob(**RecordedJob.about(file, places, cell))
+        job = CertifyJob.of(file, places, cell)
         certificate = _begun(
             out, RecordingCertificate(file.task_id, versions(), _files(path, file), len(seeds))
         )

@@ -1,1 +1,1 @@
-"""Recorded episodes in the formats that training tools read: LeRobot v3.0 and robomimic."""
+"""Recorded episodes in the formats that training tools read, and on the Hugging Face Hub."""

@@ -1,15 +1,19 @@
-"""Recorded episodes as named columns: whose joint, which body, in what order."""
+"""Recorded episodes as named columns (whose joint, which body), and what datasets write of them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.data.actors import EXPERT
+from robot_layouts.data.export.shots import Frame
 from robot_layouts.data.point_clouds import Cloud
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Recording, Trajectory
@@ -21,6 +25,8 @@ from tasks.native.format import articulation_keys, body_poses, declared_joints, 
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
+Frames = Iterable[Frame]
+Watch = Callable[[int], None]
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")  # of a body, in the world frame (m, wxyz)
 _ACTOR = "kind", "name", "sha256"
@@ -221,6 +227,58 @@ class ColumnReader:
                 " success; export them apart"
             )
         return states
+
+
+class DatasetWriter(AbstractContextManager["DatasetWriter", None]):
+    """Writes episodes one after the other; the dataset is complete when the block ends."""
+
+    def __init__(self, folder: Path, reader: ColumnReader, origin: Mapping[str, Any]) -> None:
+        """Begin a dataset.
+
+        Args:
+            folder: An empty folder.
+            reader: Names the columns.
+            origin: What is kept of where the episodes come from; anything that json can hold.
+        """
+        self._folder, self._reader, self._origin = folder, reader, origin
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
+        """Complete the dataset, unless there was an error, and let go of its files."""
+        if error is not None:
+            with suppress(OSError):  # of files that are incomplete anyway: the first error counts
+                self._let_go()
+            return
+        try:
+            self._complete()
+        finally:
+            self._let_go()
+
+    @abstractmethod
+    def add(self, columns: Columns, frames: Frames, watch: Watch, text: str | None) -> None:
+        """Write one episode.
+
+        Args:
+            columns: The episode, of T steps.
+            frames: The pictures of T moments, or of T + 1 where the dataset holds what is seen
+                after a step, too; none without channels.
+            watch: Called with the number of moments whose pictures are written.
+            text: What is to be done in it, in words; None: what the whole dataset says, if it does.
+
+        Raises:
+            OSError: If it cannot be written.
+        """
+
+    @abstractmethod
+    def note(self, about: Mapping[str, Any]) -> None:
+        """Keep more about where the last episode comes from: numbers, flags or texts by name."""
+
+    @abstractmethod
+    def _complete(self) -> None:
+        """Write what can only be written when all episodes are known."""
+
+    @abstractmethod
+    def _let_go(self) -> None:
+        """Close every file."""
 
 
 def action_names(robot: RobotDescriptor) -> list[str]:

@@ -8,7 +8,6 @@ import shutil
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
-from importlib.util import find_spec
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,10 +17,24 @@ from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_whole, shown
 from robot_layouts.core.cli import Count, Folder, Word
 from robot_layouts.core.commands import UsageError
+from robot_layouts.core.importing import optional
 from robot_layouts.core.pages import plural
 from robot_layouts.core.progress import Progress as ProgressLine
 from robot_layouts.core.writing import PARTIAL, writing_errors, written_whole
-from robot_layouts.data.export.columns import ColumnReader, Columns, Credits, succeeded
+from robot_layouts.data.export.columns import (
+    ColumnReader,
+    Columns,
+    Credits,
+    DatasetWriter,
+    succeeded,
+)
+from robot_layouts.data.export.push import (
+    DatasetPush,
+    Repository,
+    Sharing,
+    checked_name,
+    report_push,
+)
 from robot_layouts.data.playing.command_options import (
     PictureSize,
     Players,
@@ -30,20 +43,12 @@ from robot_layouts.data.playing.command_options import (
 )
 from robot_layouts.data.playing.executor import ProcessExecutor
 from robot_layouts.data.point_clouds import Box, point_cloud
-from robot_layouts.data.publishing.push import (
-    DatasetPush,
-    Repository,
-    Sharing,
-    checked_name,
-    report_push,
-)
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.data.recording.disk import claim
 from robot_layouts.simulation.rendering import drawing_problem
 from robots import (
-    MissingPackageError,
     RecordingError,
     SimulationError,
     TaskError,
@@ -56,10 +61,8 @@ from tasks.engine.columns import OVERVIEW
 if TYPE_CHECKING:
     from robot_layouts.data.export.drawing import Drawing, DrawnEpisode
     from robot_layouts.data.export.shots import Shots
-    from robot_layouts.data.export.writer import DatasetWriter
     from robot_layouts.data.playing.executor import Executor
 FORMATS = ("lerobot", "robomimic")
-INSTALL = "pip install 'robot-layouts[export]'"
 
 BoxCorners = Annotated[
     tuple[float, float, float, float, float, float],
@@ -209,8 +212,8 @@ class Export(ExportOptions):
             raise UnknownNameError("export format", self.format, FORMATS)
         if self.fps is not None and self.fps < 1:
             raise TaskError(f"fps is {self.fps}; it must be 1 or more")
-        if self.format == "lerobot" and find_spec("pyarrow") is None:
-            raise MissingPackageError(f"LeRobot datasets need pyarrow: {INSTALL}")
+        if self.format == "lerobot":
+            optional("pyarrow", "LeRobot datasets need pyarrow", "export")
         if self.format == "robomimic":
             self._expect_robomimic()
         self._expect_points()
@@ -251,13 +254,11 @@ class Export(ExportOptions):
             raise TaskError("pictures are either a video or images; choose one of them")
         if self.size is not None:
             checked_size("size", self.size)
-        if names:
-            from robot_layouts.data.export.drawing import expect_packages
-
-            lerobot = self.format == "lerobot"
-            expect_packages(
-                video=lerobot and not self.images, images=lerobot and (self.images or self.depth)
-            )
+        if names and self.format == "lerobot":
+            if not self.images:
+                optional("imageio_ffmpeg", "videos need imageio and ffmpeg", "video")
+            if self.images or self.depth:
+                optional("PIL", "png images need pillow", "video")
 
     def expect_driver(self, simulator: str) -> None:
         """Refuse pictures if a simulator draws none on this machine.
@@ -337,7 +338,7 @@ def export(
                     columns = work.columns(i, trajectory)
                     watch = _part(progress, i, len(columns) + 1, len(file))
                     drawn = draw(columns)
-                    writer.add(columns, drawn or (), watch, text=work.text(trajectory))
+                    writer.add(columns, drawn or (), watch, work.text(trajectory))
                     if drawn is not None and work.seen:
                         writer.note({"pictures_exact": drawn.exact})
                     episodes, steps = episodes + 1, steps + len(columns)
@@ -449,12 +450,10 @@ class _Work:
             yield lambda columns: Drawing(task, columns, shots, last=last)
             return
         from robot_layouts.data.export.drawing import DrawingJob, draw_in_order
-        from robot_layouts.data.playing.replay import RecordedJob
 
         numbers = [i for i in range(len(file)) if wanted.include_failures or succeeded(file[i])]
         making = {"layout": wanted.layout, "robots": wanted.robots, "pictures": True}
-        about = RecordedJob.about(file, {i: i for i in numbers}, making)
-        job = DrawingJob(**about, shots=shots, last=last)
+        job = DrawingJob.of(file, {i: i for i in numbers}, making, shots=shots, last=last)
         episodes = draw_in_order(
             job, executor, numbers, folder, lambda n: progress(n, len(file)), tell
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,29 +16,11 @@ from robot_layouts.data.playing.executor import Executor, play_all
 from robot_layouts.data.playing.replay import RecordedJob
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recording import Trajectory
-from robot_layouts.data.video import INSTALL
 from robot_layouts.simulation import Simulation
 from robot_layouts.simulation.rendering import Cameras, Observers
-from robots import MissingPackageError, SimulationError
 from tasks import TaskEnv
 from tasks.engine.columns import OVERVIEW
 from tasks.episode import States, moments, open_loop
-
-
-def expect_packages(*, video: bool, images: bool) -> None:
-    """Refuse to go on where a package that writes pictures is not installed.
-
-    Args:
-        video: Whether videos are written.
-        images: Whether png images are.
-
-    Raises:
-        MissingPackageError: If one is not.
-    """
-    if video and find_spec("imageio_ffmpeg") is None:
-        raise MissingPackageError(f"videos need imageio and ffmpeg: {INSTALL}")
-    if images and find_spec("PIL") is None:
-        raise MissingPackageError(f"png images need pillow: {INSTALL}")
 
 
 class Drawing:
@@ -118,21 +99,9 @@ def _taker(shots: Shots, simulation: Simulation) -> Callable[[], Frame]:
             for name, view in observers.look(0).items():
                 for texture, image in view.images.items():
                     taken[name, texture] = np.ascontiguousarray(image)
-        return {
-            channel: _expected(taken[channel.camera, channel.texture], channel)
-            for channel in channels
-        }
+        return {channel: taken[channel.camera, channel.texture] for channel in channels}
 
     return take
-
-
-def _expected(picture: Picture, channel: PictureChannel) -> Picture:
-    if picture.shape != channel.shape or picture.dtype != channel.dtype:
-        raise SimulationError(
-            f"a picture of {channel.camera} has shape {picture.shape} and type {picture.dtype};"
-            f" {channel.shape} and {np.dtype(channel.dtype)} were asked for"
-        )
-    return picture
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from robot_layouts.data.export.columns import ColumnReader, Columns
+from robot_layouts.data.export.columns import ColumnReader, Columns, DatasetWriter, Frames, Watch
 from robot_layouts.data.export.lerobot_files import (
     DATA_PATH,
     EPISODES_PATH,
@@ -23,8 +23,7 @@ from robot_layouts.data.export.lerobot_files import (
     describe_numbers,
     flatten,
 )
-from robot_layouts.data.export.shots import Frame, PictureChannel
-from robot_layouts.data.export.writer import DatasetWriter
+from robot_layouts.data.export.shots import PictureChannel
 from tasks.engine.columns import lerobot_columns
 
 VERSION = "v3.0"
@@ -75,14 +74,7 @@ class LeRobotWriter(DatasetWriter):
         self._origins: list[dict[str, Any]] = []
         self._frames = 0
 
-    def add(
-        self,
-        columns: Columns,
-        frames: Iterable[Frame] = (),
-        watch: Callable[[int], None] = lambda frame: None,
-        *,
-        text: str | None = None,
-    ) -> None:
+    def add(self, columns: Columns, frames: Frames, watch: Watch, text: str | None) -> None:
         """See `DatasetWriter.add`."""
         number, steps = len(self._origins), len(columns)
         text = self._task_text if text is None else text

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from robot_layouts.data.export.columns import POSE, ColumnReader, Columns, Floats
-from robot_layouts.data.export.shots import Frame, PictureChannel
-from robot_layouts.data.export.writer import DatasetWriter
+from robot_layouts.data.export.columns import (
+    POSE,
+    ColumnReader,
+    Columns,
+    DatasetWriter,
+    Floats,
+    Frames,
+    Watch,
+)
+from robot_layouts.data.export.shots import PictureChannel
 from robot_layouts.data.recording.disk import DiskFile
 from robots.control_modes import plain_mode
 from tasks.engine.cameras import Size, expect_apart
@@ -61,14 +68,7 @@ class RobomimicWriter(DatasetWriter):
         self._data = self._file.create_group("data")
         self._total, self._solved = 0, list[str]()
 
-    def add(
-        self,
-        columns: Columns,
-        frames: Iterable[Frame] = (),
-        watch: Callable[[int], None] = lambda frame: None,
-        *,
-        text: str | None = None,
-    ) -> None:
+    def add(self, columns: Columns, frames: Frames, watch: Watch, text: str | None) -> None:
         """See `DatasetWriter.add`."""
         with self._disk.refusals():
             name, steps = f"demo_{len(self._data)}", len(columns)
@@ -111,9 +111,7 @@ class RobomimicWriter(DatasetWriter):
         with self._disk.refusals():
             self._data[f"demo_{len(self._data) - 1}"].attrs.update(about)
 
-    def _add_pictures(
-        self, demo: Any, steps: int, frames: Iterable[Frame], watch: Callable[[int], None]
-    ) -> None:
+    def _add_pictures(self, demo: Any, steps: int, frames: Frames, watch: Watch) -> None:
         """Write what is seen before and after each step, ``obs`` and ``next_obs``.
 
         A picture that stands in both is compressed once.

@@ -20,11 +20,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
+from robot_layouts.core.importing import optional
 from robot_layouts.core.own_packages import PACKAGES
 from robot_layouts.core.portable import inherited_variables
 from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.core.processes.transport import is_installed
-from robots import MissingPackageError, TaskError, UnknownNameError
+from robots import TaskError, UnknownNameError
 from robots.assets.manifest import manifest_path
 
 _CONNECT_SECONDS = 10.0  # that a port may take to accept
@@ -54,13 +55,7 @@ def import_ray() -> Any:
     Raises:
         MissingPackageError: If it is not installed.
     """
-    try:
-        import ray
-    except ImportError as error:
-        raise MissingPackageError(
-            "playing on many machines needs ray: pip install 'robot-layouts[ray]'"
-        ) from error
-    return ray
+    return optional("ray", "playing on many machines needs ray", "ray")
 
 
 def check_address(address: object) -> None:

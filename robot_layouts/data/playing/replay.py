@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from typing_extensions import Self
 
 from robot_layouts.data.playing.executor import modules_of
 from robot_layouts.data.reading.json_files import TrajectoryError
@@ -25,7 +26,6 @@ from tasks.episode import PlayedEpisode, States, play
 COLUMNS = ("rewards", "success", "terminated", "truncated")
 DRAWN = "drawn"
 Start = Literal["seed", "state"]
-STARTS: tuple[Start, ...] = ("seed", "state")
 
 
 @dataclass(frozen=True)
@@ -85,13 +85,15 @@ def first_row(before: NDArray[Any], now: NDArray[Any]) -> int | None:
     A longer one differs after the last row of the other. None if there is no difference.
     """
     common = min(len(before), len(now))
-    bits = [
-        np.ascontiguousarray(rows[:common]).reshape(common, -1).view(np.uint8)
-        for rows in (before, now)
-    ]
-    if differing := np.flatnonzero((bits[0] != bits[1]).any(axis=1)).tolist():
+    differs = bytes_of(before[:common]) != bytes_of(now[:common])
+    if differing := np.flatnonzero(differs.any(axis=1)).tolist():
         return differing[0]
     return None if len(before) == len(now) else common
+
+
+def bytes_of(rows: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return the bytes of each row of an array."""
+    return np.ascontiguousarray(rows).reshape(len(rows), -1).view(np.uint8)
 
 
 def _arrays(
@@ -292,13 +294,12 @@ class RecordedJob:
     cell: Mapping[str, Any]
     task: type[MultiRobotTask]
 
-    @staticmethod
-    def about(
-        file: Recording, places: Mapping[int, int], cell: Mapping[str, Any] | None
-    ) -> dict[str, Any]:
-        """Return what jobs have in common that play episodes of a recording."""
-        path, task = file.opened.absolute(), task_class(file)
-        return {"path": path, "places": places, "cell": dict(cell or {}), "task": task}
+    @classmethod
+    def of(
+        cls, file: Recording, places: Mapping[int, int], cell: Mapping[str, Any] | None, **own: Any
+    ) -> Self:
+        """Return the job of an open recording, with the fields that its class adds."""
+        return cls(file.opened.absolute(), places, dict(cell or {}), task_class(file), **own)
 
     @property
     def modules(self) -> tuple[str, ...]:

@@ -15,17 +15,18 @@ from typing import Annotated, Any, Literal
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
 from torch import Tensor
 from torch.nn import functional
 from typing_extensions import NotRequired, Self, TypedDict
 
-from robot_layouts.core.files import read_json
+from robot_layouts.core.files import read_json, read_regular
 from robot_layouts.core.schema import FieldError, Name, check, exactly, whole
 from robot_layouts.core.writing import write_whole
 from robot_layouts.data.actors import POLICY, Actor
 from robot_layouts.data.reading.hub import HubError, downloaded_policy
 from robot_layouts.data.reading.json_files import sized_file
-from robot_layouts.data.reading.tensors import read_tensors, write_tensors
 from robot_layouts.kinematics.rotations import rotation_of
 from robots import TaskError, UnreadableFileError
 from tasks import TaskEnv
@@ -34,7 +35,13 @@ DECLARATION, WEIGHTS = "policy.json", "weights.safetensors"
 FORMAT = "robot-layouts policy 1"
 OBSERVED = "state_dict"
 MAX_BYTES = 2**20  # of a declaration
+MAX_WEIGHTS = 2**28  # bytes of the weights
 CLIP = 6.0  # standard deviations
+_PICKLES = (b"PK\x03\x04", b"\x80")  # what begins files of torch.save, and other pickles
+_PICKLED = (
+    "it is a pickle or an archive of some, as torch.save writes; pickles can run code when they are"
+    " read, and are never read here"
+)
 
 
 class Observed(TypedDict):
@@ -245,6 +252,37 @@ def save_policy(
     write_tensors(Path(folder) / WEIGHTS, weights)
     write_whole(Path(folder) / DECLARATION, json.dumps(declared, indent=1) + "\n")
     return SharedPolicy.load(folder)
+
+
+def read_tensors(path: str | PathLike[str]) -> dict[str, NDArray[np.float32]]:
+    """Return the tensors of a file by name; nothing in it is executed.
+
+    Raises:
+        UnreadableFileError: If it cannot be read, is larger than 256 MB, a pickle, not in that
+            format, or has other numbers than finite ones of 32 bits.
+    """
+    content = read_regular(path, MAX_WEIGHTS)
+    if content.startswith(_PICKLES):
+        raise UnreadableFileError(path, _PICKLED)
+    try:
+        tensors = load(content)
+    except (SafetensorError, KeyError) as error:  # KeyError: a type that NumPy lacks
+        raise UnreadableFileError(path, f"it is no safetensors file: {error}") from error
+    for name, tensor in tensors.items():
+        if tensor.dtype != np.float32 or not np.isfinite(tensor).all():
+            raise UnreadableFileError(
+                path, f"{name!r} has other numbers than finite ones of 32 bits"
+            )
+    return tensors
+
+
+def write_tensors(path: str | PathLike[str], tensors: Mapping[str, NDArray[np.float32]]) -> None:
+    """Write tensors of 32 bits by name.
+
+    Raises:
+        UnwritableFileError: If it cannot be written.
+    """
+    write_whole(path, save({name: np.array(x, order="C") for name, x in tensors.items()}))
 
 
 def _shapes(declared: Declaration, inputs: int) -> Iterator[tuple[str, list[int]]]:

@@ -18,8 +18,12 @@ import torch
 from numpy.typing import NDArray
 
 from robot_layouts.data.actors import EXPERT, is_person
-from robot_layouts.data.playing.executor import modules_of
-from robot_layouts.data.playing.in_process import random_states, seed_all, set_random_states
+from robot_layouts.data.playing.executor import (
+    modules_of,
+    random_states,
+    seed_all,
+    set_random_states,
+)
 from robot_layouts.data.playing.mode_conversion import Planner
 from robot_layouts.data.playing.policies import (
     check_policy,

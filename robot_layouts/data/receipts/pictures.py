@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.writing import write_whole
-from robot_layouts.data.playing.picture_digests import (
+from robot_layouts.data.playing.evaluation_job import (
     Image,
     Images,
     PictureTrace,

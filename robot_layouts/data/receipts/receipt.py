@@ -32,7 +32,7 @@ from robot_layouts.core.schema import (
     within,
 )
 from robot_layouts.core.writing import write_whole
-from robot_layouts.data.playing.picture_digests import BYTES, PictureTrace
+from robot_layouts.data.playing.evaluation_job import BYTES, PictureTrace
 from robot_layouts.data.reading.json_files import MAX_SEED, MAX_STEPS
 from robots import RobotLayoutsError, UnreadableFileError
 

@@ -19,10 +19,17 @@ import numpy as np
 
 from layouts.placement import RobotLike
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.quoting import cut
 from robot_layouts.data.actors import EXPERT
-from robot_layouts.data.playing.evaluation_job import EvaluationJob, TracedScore, scores_of
+from robot_layouts.data.playing.evaluation_job import (
+    BYTES,
+    EvaluationJob,
+    Images,
+    TracedScore,
+    WatchedPictures,
+    scores_of,
+)
 from robot_layouts.data.playing.executor import Executor, choose_executor
-from robot_layouts.data.playing.picture_digests import BYTES, Images, WatchedPictures
 from robot_layouts.data.playing.replay import first_row
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.playing.together import cast_of, grouped
@@ -215,7 +222,7 @@ def _shown(value: Any) -> str:
     text = str(value)
     if len(text) == 64 and " " not in text:
         return f"{text[:_DIGITS]}…"
-    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 1]}…"
+    return cut(text, _SHOWN)
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from robot_layouts.data.playing.command_options import (
     stoppable,
     tell,
 )
-from robot_layouts.data.playing.executor import Executor, checked_seeds, play_all
-from robot_layouts.data.playing.in_process import InProcessExecutor
+from robot_layouts.data.playing.executor import Executor, InProcessExecutor, checked_seeds, play_all
 from robot_layouts.data.playing.mode_conversion import converted_steps, why_lost
 from robot_layouts.data.playing.replay import RecordedJob
 from robot_layouts.data.playing.scheduler import Event, WorkersDied
@@ -158,9 +157,7 @@ def convert(
         found.kept += [seed for seed in places if seed in recorder.seeds]
         recorder.expect(missing)
         on_event(found, None)
-        job = ConvertJob(
-            **RecordedJob.about(file, places, cell), mode=mode, encoder=recorder.encoder
-        )
+        job = ConvertJob.of(file, places, cell, mode=mode, encoder=recorder.encoder)
         with closing(play_all(executor or InProcessExecutor(), job, missing)) as events:
             for event in events:
                 _note(found, event, recorder)

@@ -20,8 +20,7 @@ from robot_layouts.data.playing.command_options import (
     stoppable,
     tell,
 )
-from robot_layouts.data.playing.executor import Executor, play_all
-from robot_layouts.data.playing.in_process import InProcessExecutor
+from robot_layouts.data.playing.executor import Executor, InProcessExecutor, play_all
 from robot_layouts.data.playing.replay import (
     RecordedJob,
     Replayed,
@@ -150,7 +149,7 @@ def replay_recording(
                 f"{file.path} does not name another seed for each episode, by which workers and"
                 " recordings know them; play it without --workers and --out"
             )
-        places = dict(zip(*[range(len(file.seeds[:count]))] * 2, strict=True))
+        places = {place: place for place in range(len(file.seeds[:count]))}
     summary, recorder = ReplaySummary(len(places)), None
     if folder is not None:
         making |= {"obs_mode": obs_mode, **observing}
@@ -163,7 +162,7 @@ def replay_recording(
         if recorder is not None:
             recorder.expect(missing)
         encoder = None if recorder is None else recorder.encoder
-        job = ReplayJob(**RecordedJob.about(file, places, making), start=start, encoder=encoder)
+        job = ReplayJob.of(file, places, making, start=start, encoder=encoder)
         with closing(play_all(executor, job, missing)) as events:
             for event in events:
                 _note(summary, event, places, recorder)

@@ -1,4 +1,4 @@
-"""An environment that another process serves, as Gymnasium's."""
+"""An environment that another process serves, as Gymnasium's, and its spaces as they are sent."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.spaces import Box, Dict, Space
+from numpy.typing import NDArray
 
 from robot_layouts.core.importing import optional
+from robot_layouts.core.quoting import shown
 from robot_layouts.data.playing.served.client import mapping_of, pack
-from robot_layouts.data.serving.world import CALL, ERROR, read_space
 from robots import RobotLayoutsError
 
 SECONDS = 60.0  # for an answer: the first one takes as long as making the world
 MOST_BYTES = 2**28  # of an observation
 TOO_BIG = 1009  # of a websocket's codes
+CALL, ERROR = "call", "error"
 _SPACES = "action_space", "observation_space"
 
 
@@ -110,7 +113,7 @@ class RemoteEnv(gymnasium.Env[Any, Any]):
             raise self._closed(error) from None
         return self._receive("an answer", *names)
 
-    def _space(self, name: str) -> gymnasium.Space[Any]:
+    def _space(self, name: str) -> Space[Any]:
         try:
             return read_space(self.about.pop(name))
         except (TypeError, ValueError) as error:
@@ -143,3 +146,36 @@ class RemoteEnv(gymnasium.Env[Any, Any]):
 
     def _error(self, what: str) -> RemoteTaskError:
         return RemoteTaskError(f"the environment at {self._name}: {what}")
+
+
+def written_space(space: Space[Any]) -> dict[str, Any]:
+    """Return a space as what can be sent: its bounds, or those of its parts by name.
+
+    Bounds that are the same for all numbers are single ones, so that pictures take no more.
+    """
+    if isinstance(space, Dict):
+        return {"parts": {name: written_space(part) for name, part in space.spaces.items()}}
+    assert isinstance(space, Box)  # all that tasks observe and take
+    return {"low": _bound(space.low), "high": _bound(space.high), "shape": list(space.shape)}
+
+
+def _bound(numbers: NDArray[Any]) -> NDArray[Any]:
+    same = numbers.size > 0 and (numbers == numbers.flat[0]).all()
+    return numbers.flat[:1].reshape(()) if same else numbers
+
+
+def read_space(written: Any) -> Space[Any]:
+    """Return the space that `written_space` wrote.
+
+    Raises:
+        ValueError: If it wrote none like that.
+        TypeError: Likewise.
+    """
+    match written:
+        case {"parts": dict(parts)}:
+            return Dict({name: read_space(part) for name, part in parts.items()})
+        case {"low": np.ndarray() as low, "high": np.ndarray() as high, "shape": list(shape)}:
+            low, high = np.broadcast_to(low, shape), np.broadcast_to(high, shape)
+            return Box(low, high, dtype=low.dtype.type)
+        case _:
+            raise ValueError(f"{shown(written)} is no space")

@@ -6,28 +6,38 @@ import asyncio
 import hmac
 import logging
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import partial
 from http import HTTPStatus
+from importlib import metadata
 from typing import Any
 from urllib.parse import parse_qs
 
+import numpy as np
 import torch
 
 from layouts.commands import Server
 from robot_layouts.core.cli import Count
 from robot_layouts.core.importing import optional
+from robot_layouts.core.processes.transport import as_ours
+from robot_layouts.core.quoting import shown
 from robot_layouts.data.playing.command_options import ControlMode, Observing, stop_signals
-from robot_layouts.data.playing.served.client import pack
-from robot_layouts.data.serving.world import ClientWorld, about
-from robots import TaskError
-from tasks import make
+from robot_layouts.data.playing.served.client import pack, unpack
+from robot_layouts.data.serving.client import CALL, ERROR, written_space
+from robots import TaskError, UnknownNameError
+from robots.control_modes import plain_mode
+from tasks import TaskEnv, make
 from tasks.cell_options import CellOptions
+from tasks.description import instruction_of
+from tasks.engine.checks import RECONFIGURE
+from tasks.interfaces.gymnasium import info_row, row
 
 MOST_BYTES = 2**24  # of a client's message, else the connection ends
+MOST_READ = 2**20  # bytes of a client's message: an action takes some hundred
 CLIENTS = 8
+_RESET, _STEP = "reset", "step"
 _TOKEN_BYTES = 32
 _REFUSED = "The token is missing or another: connect to the address that the command printed.\n"
 _CROWDED = "As many clients as the server takes have worlds here; see --clients.\n"
@@ -121,6 +131,91 @@ class _Service:
             await connection.send(self._first)
             async for message in connection:
                 await connection.send(world.answer(message))
+
+
+class ClientWorld:
+    """The world of one client; it is made when an episode first begins."""
+
+    def __init__(self, make: Callable[[], TaskEnv]) -> None:
+        """Keep how it is made."""
+        self._make = make
+        self._env: TaskEnv | None = None
+
+    def answer(self, data: bytes | str) -> bytes:
+        """Return the answer to a message; to one that is invalid, why, and nothing has changed."""
+        try:
+            return pack(self._answer(data))
+        except Exception as error:  # also of a user's own task: others go on
+            return pack({ERROR: str(as_ours(error))})
+
+    def close(self) -> None:
+        """Let the world go."""
+        if self._env is not None:
+            self._env.close()
+
+    def _answer(self, data: bytes | str) -> dict[str, Any]:
+        if isinstance(data, str):
+            raise TaskError(f"a text was sent, {shown(data)}; a message is a mapping in msgpack")
+        if len(data) > MOST_READ:
+            raise TaskError(
+                f"a message of {len(data):,} bytes was sent; {MOST_READ:,} are most, and an action"
+                " takes some hundred"
+            )
+        message = unpack(data)
+        if not isinstance(message, Mapping):
+            raise TaskError(f"{shown(message)} was sent; a message is a mapping")
+        call, given = message.get(CALL), {k: v for k, v in message.items() if k != CALL}
+        if call == _RESET:
+            return self._reset(**_only(given, "seed"))
+        if call == _STEP:
+            return self._step(**_only(given, "action"))
+        raise UnknownNameError("call", call, (_RESET, _STEP))
+
+    def _reset(self, seed: Any = None) -> dict[str, Any]:
+        if self._env is None:
+            self._env = self._make()
+        obs, info = self._env.reset(seed, {RECONFIGURE: True})
+        return {"observation": row(obs), "info": info_row(info, self._env.seeds[0])}
+
+    def _step(self, action: Any = None) -> dict[str, Any]:
+        if self._env is None:
+            raise TaskError("no episode has begun; reset first")
+        parts = isinstance(action, Mapping)
+        own = {name: np.array(part) for name, part in action.items()} if parts else np.array(action)
+        obs, reward, terminated, truncated, info = self._env.step(own)
+        return {
+            "observation": row(obs),
+            "reward": reward[0].item(),
+            "terminated": bool(terminated[0]),
+            "truncated": bool(truncated[0]),
+            "info": info_row(info, self._env.seeds[0]),
+        }
+
+
+def _only(given: Mapping[Any, Any], name: str) -> dict[str, Any]:
+    for key in given:
+        if key != name:
+            raise UnknownNameError("part of the message", key, (CALL, name))
+    return {name: given[name]} if name in given else {}
+
+
+def about(env: TaskEnv) -> dict[str, Any]:
+    """Return what clients are told first: what is to be done, by which arms, and the spaces."""
+    layout = env.layout
+    return {
+        "task": env.task_id,
+        "instruction": instruction_of(env.task_class),
+        "robots": {place: placed.robot.name for place, placed in layout.items()},
+        "arms": list(layout.arms),
+        "action_split": {name: [s.start, s.stop] for name, s in env.action_split.items()},
+        "control_mode": plain_mode(env.control_mode),
+        "control_frequency": env.scenario.control_frequency,
+        "max_episode_steps": env.max_episode_steps,
+        "obs_mode": env.obs_mode,
+        "action_space": written_space(env.single_action_space),
+        "observation_space": written_space(env.single_observation_space),
+        "version": metadata.version("robot-layouts"),
+    }
 
 
 def serve_command(

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
-from pathlib import Path
 from string import ascii_uppercase
 
 from robot_layouts.core.pages import plural
@@ -21,9 +20,8 @@ from robot_layouts.data.suite.results import (
     overall,
     result_of,
 )
-from robot_layouts.data.suite.run import SuiteRun, expect_untouched, read_run
+from robot_layouts.data.suite.run import SuiteRun
 from robot_layouts.data.suite.suite import SHORT
-from robots import TaskError
 
 ALL = "all"  # the row of all cases together
 NONE = "–"
@@ -215,27 +213,8 @@ def summary(run: SuiteRun) -> Iterator[str]:
         yield f"  {name:<{width}}  {words}"
 
 
-def read_runs(folders: Sequence[Path]) -> list[SuiteRun]:
-    """Return runs of one suite, to be shown side by side.
-
-    Raises:
-        TaskError: If they are of several suites, too many, or nothing was played.
-        ReceiptError: If a receipt is damaged, or was changed.
-    """
-    if not 1 <= len(folders) <= len(LETTERS):
-        raise TaskError(f"{len(folders)} runs were given; a report shows 1 to {len(LETTERS)}")
-    runs = [expect_untouched(read_run(folder)) for folder in folders]
-    for run in runs:
-        if run.suite.hash != runs[0].suite.hash:
-            names = " and ".join(f"{r.folder}: {r.suite.name} {r.suite.id}" for r in (runs[0], run))
-            raise TaskError(f"runs of one suite can be compared; these are of two ({names})")
-        if not run.receipts:
-            raise TaskError(f"nothing has been played in {run.folder}; there is nothing to report")
-    return runs
-
-
 def render_markdown(runs: Sequence[SuiteRun]) -> str:
-    """Return the report's tables as Markdown; see `read_runs`."""
+    """Return the report's tables of runs of one suite, side by side, as Markdown."""
     suite = runs[0].suite
     lines = [f"# {suite.name} {suite.id}", "", f"{about(runs)} SHA-256: `{suite.hash}`.", ""]
     for title, words, shown, text in parts(runs):

@@ -138,13 +138,32 @@ def played_cases(folder: Path, suite: Suite) -> list[Case]:
 
 
 def read_receipt(folder: Path, case: Case) -> Receipt:
-    """Return the receipt of a case.
+    """Return the receipt of a case: of the same task, seeds, places and settings.
+
+    Files of robots and sources of tasks are not compared: that is what verifying is for.
 
     Raises:
-        ReceiptError: If it is damaged, or of something else.
+        ReceiptError: If it is damaged, of another task, of other seeds, or made otherwise.
     """
     path = receipt_path(folder, case)
-    return expect_of_case(Receipt.read(path), case, path)
+    receipt = Receipt.read(path)
+    cls = get_task_class(case.task)
+    if receipt.task["id"] != cls.task_id:
+        raise ReceiptError(f"{path} is of {receipt.task['id']}, not of {cls.task_id}")
+    if {episode.seed for episode in receipt.episodes} != {*case.seeds}:
+        raise ReceiptError(f"{path} has other seeds than the case {case.name} of its suite")
+    try:
+        guessed = receipt.environment.get("guessed", {})
+        made = make_scenario(cls, **make_again(receipt.making, guessed, cls, {}))
+    except ReceiptError as error:
+        raise ReceiptError(f"{path}: {error}") from error
+    others = list(_differing(cls, made, make_scenario(cls, **case.making)))
+    if others:
+        raise ReceiptError(
+            f"{path} was not made as the case {case.name} of its suite: different are"
+            f" {', '.join(others)}"
+        )
+    return receipt
 
 
 def write_run(run: SuiteRun) -> None:
@@ -181,38 +200,6 @@ def untouched(receipt: Receipt, path: Path) -> Receipt:
     """
     if not receipt.untouched:
         raise ReceiptError(f"{path} was changed after it was written: its hash is another")
-    return receipt
-
-
-def expect_of_case(receipt: Receipt, case: Case, path: Path) -> Receipt:
-    """Return a receipt that is of a case: the same task, seeds, places and settings.
-
-    Files of robots and sources of tasks are not compared: that is what verifying is for.
-
-    Args:
-        receipt: The receipt.
-        case: The case.
-        path: Where the receipt is, for errors.
-
-    Raises:
-        ReceiptError: If it is of another task, of other seeds, or made otherwise.
-    """
-    cls = get_task_class(case.task)
-    if receipt.task["id"] != cls.task_id:
-        raise ReceiptError(f"{path} is of {receipt.task['id']}, not of {cls.task_id}")
-    if {episode.seed for episode in receipt.episodes} != {*case.seeds}:
-        raise ReceiptError(f"{path} has other seeds than the case {case.name} of its suite")
-    try:
-        guessed = receipt.environment.get("guessed", {})
-        made = make_scenario(cls, **make_again(receipt.making, guessed, cls, {}))
-    except ReceiptError as error:
-        raise ReceiptError(f"{path}: {error}") from error
-    others = list(_differing(cls, made, make_scenario(cls, **case.making)))
-    if others:
-        raise ReceiptError(
-            f"{path} was not made as the case {case.name} of its suite: different are"
-            f" {', '.join(others)}"
-        )
     return receipt
 
 

@@ -9,9 +9,9 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from layouts.viewer.cell import Text, printable
 from layouts.viewer.page import tell
 from layouts.viewer.server import serving
-from layouts.viewer.text import Text, printable
 from robot_layouts.data.teleop.session import Phase, Session
 from robot_layouts.data.teleop.widgets import (
     KEYS,

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from layouts.viewer.cell import STYLE, node
 from layouts.viewer.scene import COARSE, CellScene
-from layouts.viewer.text import STYLE, node
 from robot_layouts.data.teleop.session import Session
 from robot_layouts.kinematics.rotations import Floats
 from robots import TaskError

@@ -23,9 +23,8 @@ from layouts.export.ros2.groups import PlanningGroup, PlanningGroups, RosNames
 from robot_layouts.core.bounds import FAR, checked_number, shown
 from robot_layouts.core.errors import MotionError, unknown_name_message
 from robot_layouts.core.files import read_json
-from robot_layouts.core.new_files import write_new
 from robot_layouts.core.schema import AnyText, check, exactly, length, within
-from robot_layouts.core.writing import write_whole
+from robot_layouts.core.writing import write_new, write_whole
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.model.obstacles import Held, Obstacle, Track
 from robot_layouts.motion.timed_motion import TimedMotion

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from robot_layouts.core.cli import Word
-from robot_layouts.data.publishing.card import card, licence_for
-from robot_layouts.data.publishing.described import Described, describe
+from robot_layouts.data.export.described import Described, card, describe, licence_for
 from robot_layouts.data.reading.hub import HubError, reason, repository_and_revision
 from robots.assets.hub_client import ENDPOINT_VARIABLE
 

@@ -23,7 +23,7 @@ from robot_layouts.data.playing.environment import versions
 from robot_layouts.data.playing.executor import Executor
 from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.reading.json_files import FILE_SIZE
-from robot_layouts.data.recipes.recipe import (
+from robot_layouts.data.recipe import (
     Recipe,
     RecordingRecipe,
     load_recipe,

@@ -1,14 +1,21 @@
-"""What a folder of data is: a recording or an export, of which task, robots and cameras."""
+"""What a folder of data is, of which task, robots and cameras, and the card that says so.
+
+Numbers of a recording (actions, states, poses) are made of none of the robots' files. Pictures and
+points show their meshes, so licences that forbid commercial use hold for these, too.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from layouts.export.files import licences_of
 from robot_layouts.core.files import read_json
+from robot_layouts.core.pages import fragment
 from robot_layouts.data.reading.hdf5 import Hdf5File, damage_errors
 from robot_layouts.data.reading.hub import CERTIFICATE, HubError
 from robot_layouts.data.reading.json_files import (
@@ -20,11 +27,17 @@ from robot_layouts.data.reading.json_files import (
     read_summary,
 )
 from robot_layouts.data.reading.recording import Recording, all_files
-from robots import UnreadableFileError
+from robots import RobotRegistry, UnknownNameError, UnreadableFileError
+from robots.assets import scenery
+from robots.assets.manifest import load_manifest
+from robots.control_modes import written_mode
+from tasks import list_tasks
 
 LEROBOT, ROBOMIMIC = "meta/info.json", ("low_dim.hdf5", "image.hdf5")
 ORIGIN = "meta/recording.json"  # of a LeRobot export
 _NO_PICTURES = ("none", "state", "state_dict")  # observation modes without
+UNKNOWN = "unknown"
+_FREE_OF_CHARGE, _ALIKE = "BY-NC", "BY-NC-SA"
 
 
 @dataclass(frozen=True)
@@ -154,3 +167,96 @@ def _everything(folder: Path) -> Iterator[Path]:
         hidden = any(part.startswith(".") for part in inside.parts)
         if path.is_file() and not hidden and inside.as_posix() != "README.md":
             yield path
+
+
+class UsedFiles(NamedTuple):
+    """Files that a data set was made with.
+
+    Attributes:
+        name: What they are of.
+        licence: Its short name; `UNKNOWN` if they are the user's own.
+        words: What it asks for.
+    """
+
+    name: str
+    licence: str = UNKNOWN
+    words: str = "its author's; not known here"
+
+
+def parts_of(data: Described) -> list[UsedFiles]:
+    """Return the files of robots and things that a data set was made with, and their licences."""
+    found: list[UsedFiles] = []
+    for place, about in data.layout.items():
+        name = f"{about['robot']} ({place})"
+        try:
+            robot = RobotRegistry.load(about["robot"])
+        except UnknownNameError:
+            found.append(UsedFiles(name))
+        else:
+            found += [UsedFiles(name, *licence) for licence in licences_of(robot)]
+    if not data.layout:
+        found.append(UsedFiles("its robots, which the data does not name"))
+    if data.task_id not in list_tasks():
+        found.append(UsedFiles(f"things of the task {data.task_id}"))
+    if data.pictures:
+        origin = load_manifest().package(scenery.PACKAGE).origin
+        words = f"{origin.licence} ({origin.licence_note})"
+        found.append(UsedFiles("table and floor", origin.licence, words))
+    return found
+
+
+def licence_for(data: Described, wanted: str | None) -> str | None:
+    """Return the licence under which a data set is shared, as the Hub writes it; None if not said.
+
+    Args:
+        data: The data set.
+        wanted: What its author wants.
+
+    Raises:
+        HubError: If the licences of what its pictures show forbid that, or are not known.
+    """
+    if not data.pictures:
+        return wanted
+    shown = parts_of(data)
+    what = f"the pictures of this data set ({', '.join(data.pictures)}) show"
+    unknown = [part.name for part in shown if part.licence == UNKNOWN]
+    if unknown and wanted is None:
+        raise HubError(
+            f"{what} {' and '.join(unknown)}, whose licence is not known here; if you may share"
+            " them, say under which licence with --licence"
+        )
+    bound = [part for part in shown if _FREE_OF_CHARGE in part.licence]
+    alike = any(_ALIKE in part.licence for part in bound)
+    needed = "cc-by-nc-sa-4.0" if alike else "cc-by-nc-4.0"
+    given = (wanted or needed).lower()
+    if bound and ("nc" not in given.split("-") or (alike and given != needed)):
+        listed = ", ".join(f"{part.name}, {part.licence}" for part in bound)
+        raise HubError(
+            f"{what} {listed}: they may not be shared under {wanted}, but under {needed}; leave"
+            " --licence out, or export without pictures"
+        )
+    return given
+
+
+def card(data: Described, name: str, licence: str | None) -> str:
+    """Return the card of a data set, as the Hub's README.md.
+
+    Args:
+        data: The data set.
+        name: ``OWNER/NAME`` there.
+        licence: See `licence_for`.
+    """
+    mode = data.control_mode
+    text = fragment(
+        "robot_layouts.data.export/card.md.jinja",
+        data=data,
+        name=name,
+        licence=licence,
+        control_mode=mode if isinstance(mode, str) else written_mode(mode),
+        version=metadata.version("robot-layouts"),
+        listed=data.task_id in list_tasks(),
+        certified=any(file.startswith("certificate") for file in data.files),
+        numbers=lambda values: ", ".join(f"{number:.4g}" for number in values),
+        parts=dict.fromkeys(parts_of(data)),
+    )
+    return str(text)

@@ -1,1 +1,0 @@
-"""Data sets for others: on the Hugging Face Hub, with a card."""

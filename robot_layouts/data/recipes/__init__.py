@@ -1,1 +1,0 @@
-"""Data sets as recipes: files that say how recordings and exports are made again."""
