@@ -264,8 +264,8 @@ def make(
     Args:
         task_id: Its id or another of its names.
         num_envs: Number of environments in this process.
-        robots: Other robots for some places: a mapping place → robot, or one robot for a task
-            with one place; by name, descriptor, the path of a URDF or MJCF to guess it from, or
+        robots: Other robots for some places: a mapping place → robot, or one robot for all of
+            them; by name, descriptor, the path of a URDF or MJCF to guess it from, or
             ``MODULE:NAME``. They stand at the layout's places, or, in a task that fits its robots,
             where `layouts.at_task` puts them. One that lacks its place's keyframe starts from its
             home's. One robot of several limbs serves all places, as `layouts.at_task` puts it.
@@ -395,10 +395,8 @@ def _replace_robots(
     if isinstance(robots, (str, PathLike, RobotDescriptor)):
         if (robot := load_robot(robots)).limbs:
             return at_task(robot, cls if layout == cls.layout else layout)
-        if len(layout) == 1:
-            return _replace_robots(cls, layout, {next(iter(layout)): robot})
-    given = [robots] if isinstance(robots, (str, RobotDescriptor)) else robots
-    names = [name for name in given if isinstance(name, str)] if isinstance(given, list) else []
+        return _replace_robots(cls, layout, dict.fromkeys(layout, robot))
+    names = [name for name in robots if isinstance(name, str)] if isinstance(robots, list) else []
     example = dict(zip(layout, names or ["panda"], strict=False))
     raise TaskError(
         f"robots={shown(robots)} does not say which place each robot takes; the places are"

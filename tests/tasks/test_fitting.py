@@ -10,6 +10,7 @@ from layouts import Layout, at_task, face_to_face, side_by_side
 from layouts.shared_place import shared_place
 from robots import TaskError
 from tasks.language.fitting import AS_DECLARED, Fit
+from tasks.registry import make_scenario
 
 TASK = "TwoRobotHandOver-v1"
 
@@ -97,3 +98,9 @@ def test_the_shared_place_lies_in_the_middle_of_equal_arms():
     (x, y), depth = found
     assert np.hypot(x, y) < 0.05
     assert 0.05 < depth < 0.3
+
+
+def test_one_robot_stands_in_all_places():
+    task = tasks.get_task_class("TwoRobotHandOver-v1")
+    one = make_scenario(task, robots="so101").layout
+    assert one == make_scenario(task, robots={"left": "so101", "right": "so101"}).layout
