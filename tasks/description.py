@@ -29,6 +29,7 @@ PARITY_RESULTS = Path(__file__).with_name("parity.json")
 UNKNOWN = "–"
 LONG = 42  # letters
 OURS = "robot-layouts"  # where built-in tasks come from
+OWN_SOURCE = f"{OURS}; geometry and rewards are its own"  # of those that follow no other's file
 
 _SUCCESS = "Success:"
 _SECTIONS = ("Attributes:", "Args:", "Note:", "Example:", "Examples:")  # of Google docstrings
@@ -210,7 +211,7 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
         ("success", text.success),
         ("episode", f"{env.max_episode_steps} steps, {env.scenario.control_frequency:g} per s"),
         ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),
-        ("source", cls.source),
+        ("source", cls.source or ("" if origin(cls.task_id) else OWN_SOURCE)),
         ("other names", ", ".join([*_full_name(cls), *other_names(cls)])),
         ("from", origin(cls.task_id) or OURS),
         ("parity", _parity(env)),

@@ -29,7 +29,6 @@ class CellCrossOver(CellTask):
     Success: every cube rests within 5 cm of its mark, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Cross over: bring each cube to the mark before your neighbour.",
         "Neighbours exchange sides: your cube belongs on the mark before the arm beside you.",
@@ -63,12 +62,7 @@ class CellCrossOver(CellTask):
         rest = [is_at_rest(state, f"cube_{arm}") for arm in self.arms]
         near = [way <= RADIUS for way in self.ways(state)]
         count = self.count([n & r & ~h for n, r, h in zip(near, rest, held, strict=True)])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_across": count >= 1,
-            "are_three_across": count >= 3,
-            "success": count >= 4,
-        }
+        return {"is_one_held": self.count(held) >= 1, **self.passed(count, 1, 3, 4)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their marks."""

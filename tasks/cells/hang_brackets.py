@@ -59,7 +59,6 @@ class CellHangBrackets(CellTask):
     Success: all three rest on the pegs, one on the other, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hang the red bracket on the pegs, the blue one back to back with it, and the bar on both.",
         "Assemble the three parts on the two pegs: red first, then blue, the green bar last.",
@@ -90,12 +89,7 @@ class CellHangBrackets(CellTask):
         held = [state.is_grasping(arm, part) for arm, part in PARTS.items()]
         parts = zip(PARTS.values(), self.ways(state), held, strict=True)
         on = self.count([(way <= ON) & is_at_rest(state, part) & ~h for part, way, h in parts])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_on": on >= 1,
-            "are_two_on": on >= 2,
-            "success": on >= 3,
-        }
+        return {"is_one_held": self.count(held) >= 1, **self.passed(on, 1, 2, 3)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the parts to their seats."""

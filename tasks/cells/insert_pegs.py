@@ -62,7 +62,6 @@ class CellInsertPegs(CellTask):
     level to 15°.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the yoke up and insert a peg into each of its sockets.",
         "One lifts the grey yoke and holds it, two put their pegs into it.",

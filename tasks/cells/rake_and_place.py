@@ -46,7 +46,6 @@ class CellRakeAndPlace(CellTask):
     Success: both blocks are in their boxes, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Pull the blocks near with the rake and put each into the box of its side.",
         "One rakes the two far blocks in, the others put them into their boxes.",

@@ -38,7 +38,6 @@ class CellShiftRing(CellTask):
     Success: every cube rests in the zone after its own, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Pass on all cubes at once, each to the next zone.",
         "Everybody bring the cube on your left to the zone on your right.",
@@ -76,12 +75,8 @@ class CellShiftRing(CellTask):
         rests = [is_at_rest(state, f"cube_{arm}") for arm in self.arms]
         near = [way <= RADIUS for way in self.ways(state)]
         done = self.count([n & r & ~h for n, r, h in zip(near, rests, held, strict=True)])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_there": done >= 1,
-            "are_half_there": done >= len(self.arms) / 2,
-            "success": done >= len(self.arms),
-        }
+        every = len(self.arms)
+        return {"is_one_held": self.count(held) >= 1, **self.passed(done, 1, every / 2, every)}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCPs, the cubes, and their ways to their zones."""

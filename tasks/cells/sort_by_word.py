@@ -43,7 +43,6 @@ class CellSortByWord(CellTask):
     Success: every cube rests on its pad, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = tuple(words.format(*choice) for words in PHRASES for choice in CHOICES)
     layout = ring({"red": "panda_wristcam", "green": "franka_panda", "blue": "panda"}, radius=0.75)
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}
@@ -74,11 +73,7 @@ class CellSortByWord(CellTask):
                 for arm, way in zip(self.arms, self.ways(state), strict=True)
             ]
         )
-        return {
-            "is_one_there": done >= 1,
-            "are_two_there": done >= 2,
-            "success": done >= 3,
-        }
+        return self.passed(done, 1, 2, 3)
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their pads."""

@@ -38,7 +38,6 @@ class CellStowTwo(CellTask):
     pressed by 5 mm.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the button, stow both cubes in the drawer, and shut it.",
         "Keep the button down; open the drawer, put the two cubes into it, and close it again.",

@@ -7,7 +7,7 @@ from math import atan2, hypot
 from typing import Any, ClassVar
 
 from robot_layouts.simulation import PhysicsSettings, State, World
-from robot_layouts.simulation.maths import Array, Flags, Floats, floats
+from robot_layouts.simulation.maths import Array, Flags, Floats, floats, norm
 from robots.descriptor import Vector3
 from tasks.engine.env import MultiRobotTask
 from tasks.engine.task import Info
@@ -155,3 +155,12 @@ class CellTask(MultiRobotTask):
         """Return how many of some flags, each (N,) bool, are true, (N,)."""
         total: Any = sum(map(floats, flags))
         return total
+
+    def passed(self, count: Floats, *least: float) -> dict[str, Flags]:
+        """Return the last stages, one for each number: passed where the count is at least that."""
+        stages = [*self.stages][-len(least) :]
+        return {stage: count >= number for stage, number in zip(stages, least, strict=True)}
+
+    def tip_distance(self, state: State, arm: str, part: str, point: Vector3) -> Floats:
+        """Return how far an arm's TCP is from a point in a body's frame, (N,) (m)."""
+        return norm(transform(state.pose(part), state.array((point,))) - state.tcp_position(arm))
