@@ -70,21 +70,8 @@ class DeviceControl(ModeController):
         from_target: Any = self._from_target
         base: Any = torch.where(from_target, before, present) if self._any_target else present
         targets: Any = self._positions.targets(action, base)
-        scaled = self._in_units(action)
+        scaled = self._scaled(action)
         for arm in self._arms.values():
             targets[:, arm.tool.joints] = arm.sent(action, scaled, state)
         self.targets = targets
-        if not self.moves:
-            return targets, None
-        velocities = torch.zeros_like(targets)
-        velocities[:, self._velocity_joints] = scaled[:, self._velocity_numbers]
-        for joint, number in self._bases:
-            heading, forward = present[:, joint + 2], scaled[:, number]
-            velocities[:, joint] = torch.cos(heading) * forward
-            velocities[:, joint + 1] = torch.sin(heading) * forward
-            velocities[:, joint + 2] = scaled[:, number + 1]
-        return targets, velocities
-
-    def _in_units(self, action: Any) -> Any:
-        low, high, centre, half = self._scale
-        return centre + half * torch.clamp(action, low, high)
+        return targets, self._velocities(present, scaled) if self.moves else None

@@ -9,11 +9,11 @@ from torch import Tensor
 
 from layouts import Layout
 from robot_layouts.kinematics.chain import Chain
-from robot_layouts.kinematics.quaternions import inverted, multiplied, rotated
+from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.simulation.control.joint_positions import DrivenGroup
-from robot_layouts.simulation.control.tcp import TcpController, added
+from robot_layouts.simulation.control.tcp import TcpController, inverse
 from robot_layouts.simulation.mujoco_warp.arrays import beside, move_arrays
-from robot_layouts.simulation.mujoco_warp.state import DeviceIndex, DeviceState, rotation_matrix
+from robot_layouts.simulation.mujoco_warp.state import DeviceState, rotation_matrix
 from robot_layouts.simulation.solvers import FOLLOWING, TreeFollower
 from robots import SimulationError
 
@@ -105,8 +105,16 @@ class DeviceFollower(TreeFollower):
         return DeviceChain(self._chain, self._free, device)
 
 
+def _upright(turn: Columns) -> Columns:
+    """Return quaternions with w ≥ 0."""
+    sign = torch.where(turn[0] < 0, -1.0, 1.0)
+    return tuple(sign * number for number in turn)
+
+
 class DeviceTcp(TcpController):
     """Drives a joint group by the pose of its TCP, in all worlds at once; see `TcpController`."""
+
+    _upright = staticmethod(_upright)
 
     def __init__(self, tool: DrivenGroup, layout: Layout, device: torch.device) -> None:
         """Take what is driven.
@@ -127,12 +135,6 @@ class DeviceTcp(TcpController):
         )
         self._chain = follower.on(device)
 
-    def find(self, index: DeviceIndex) -> None:
-        """Find the frames in worlds that were built."""
-        links, root_link = index.links[self.tool.robot], self.tool.group.root_link
-        self._tcp_frame, self._link_frame = index.tcps[self.arm], links[self._limb.tcp_link]
-        self._root_frame = index.bases[self.tool.robot] if root_link is None else links[root_link]
-
     def restart(self, state: DeviceState, where: Tensor) -> None:
         """Let the targets of some worlds be where the TCPs are."""
         now = torch.stack(self._present(state), 1)
@@ -147,7 +149,7 @@ class DeviceTcp(TcpController):
             scaled: The same, clipped and scaled to metres.
             state: The worlds before the step.
         """
-        wanted = self._asked(action, scaled, state)
+        wanted = self._sent_to(action, scaled, state)
         if self.tool.group.target:
             vars(self)["targets"] = torch.stack(wanted, 1)
         place = torch.stack(self._at_link(wanted, state), 1).double()
@@ -156,28 +158,17 @@ class DeviceTcp(TcpController):
         pose[:, 3, 3] = 1.0
         joints: Any = state.joint_positions
         found, arrived = self._chain.follow(pose, joints[:, self.tool.own].double())
-        own = slice(
-            self.tool.joints.start - self.tool.own.start,
-            self.tool.joints.stop - self.tool.own.start,
-        )
         present = joints[:, self.tool.joints]
-        return torch.where(arrived[:, None], found[:, own].float(), present)
+        return torch.where(arrived[:, None], found[:, self._own].float(), present)
 
     # -- inside ------------------------------------------------------------------------------
 
-    def _asked(self, action: Any, scaled: Any, state: DeviceState) -> Columns:
+    def _sent_to(self, action: Any, scaled: Any, state: DeviceState) -> Columns:
         """Return where the TCP is to be, in its root link's frame."""
         group, place = self.tool.group, _columns(scaled[:, self._place])
         turn = self._turning(action) if group.asks.turn else None
-        if not group.delta:
-            assert turn is not None
-            return *place, *turn
         before = _columns(self.targets) if group.target else self._present(state)
-        spot, way = before[:3], before[3:]
-        moved = place if self._by_root else rotated(way, place)
-        if turn is not None:
-            way = multiplied(turn, way) if self._turns_by_root else multiplied(way, turn)
-        return *added(spot, moved), *_upright(way)
+        return self._asked(place, turn, before)
 
     def _turning(self, action: Any) -> Columns:
         angles = action[:, self._angles]
@@ -192,35 +183,18 @@ class DeviceTcp(TcpController):
     def _present(self, state: DeviceState) -> Columns:
         """Return where the TCP is, in its root link's frame."""
         root, tcp = (_columns(state.all_poses[f]) for f in (self._root_frame, self._tcp_frame))
-        return _combined(_inverse(root), tcp)
+        return self._combined(inverse(root), tcp)
 
     def _at_link(self, wanted: Columns, state: DeviceState) -> Columns:
         """Return where the link that orients the TCP is, if the TCP is where it is wanted."""
         if self._tcp_frame == self._link_frame:
             return wanted
         tcp, link = (_columns(state.all_poses[f]) for f in (self._tcp_frame, self._link_frame))
-        return _combined(wanted, _combined(_inverse(tcp), link))
+        return self._combined(wanted, self._combined(inverse(tcp), link))
 
 
 def _columns(rows: Any) -> Columns:
     return rows.unbind(-1)
-
-
-def _upright(turn: Columns) -> Columns:
-    """Return quaternions with w ≥ 0."""
-    sign = torch.where(turn[0] < 0, -1.0, 1.0)
-    return tuple(sign * number for number in turn)
-
-
-def _inverse(pose: Columns) -> Columns:
-    back = inverted(pose[3:])
-    return *rotated(back, tuple(-number for number in pose[:3])), *back
-
-
-def _combined(first: Columns, second: Columns) -> Columns:
-    """Return the poses ``second`` of what is seen from ``first``."""
-    place = added(first[:3], rotated(first[3:], second[:3]))
-    return *place, *_upright(multiplied(first[3:], second[3:]))
 
 
 def _errors(poses: Tensor, wanted: Tensor) -> Tensor:
