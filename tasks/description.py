@@ -18,7 +18,7 @@ from rich.table import Table
 from layouts import Layout
 from robot_layouts.simulation import Camera
 from robot_layouts.simulation.backend import CLONING
-from robot_layouts.simulation.scene.cameras import AnyCamera, field_of_view, lens_of, ridden
+from robot_layouts.simulation.cameras import AnyCamera, field_of_view, lens_of, ridden
 from robots import TaskError
 from tasks.engine.cameras import cameras_of
 from tasks.engine.env import MultiRobotTask, TaskEnv

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from robot_layouts.core.bounds import checked_whole
 from robot_layouts.core.writing import written_whole
+from robot_layouts.simulation.cameras import AnyCamera, Camera, camera_name, lens_of
 from robot_layouts.simulation.rendering import FIELD_OF_VIEW
-from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, camera_name, lens_of
 from robots import MissingPackageError, TaskError, UnknownNameError
 from tasks.engine.cameras import cameras_of, configured, resized
 from tasks.engine.env import TaskEnv

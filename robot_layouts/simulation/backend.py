@@ -23,10 +23,10 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
-from robot_layouts.simulation.scene.cameras import AnyCamera, View
-from robot_layouts.simulation.scene.parts import Part as Part
-from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.variation import Variation
+from robot_layouts.simulation.world import Part as Part
 from robot_layouts.simulation.world import Placements, World
 from robots import UnknownNameError
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.simulation.scene.cameras import (
+from robot_layouts.simulation.cameras import (
     FIELD_OF_VIEW,
     SIZE,
     AnyCamera,
@@ -24,7 +24,7 @@ from robots import SimulationError
 from robots.descriptor import Vector3
 
 _VULKAN = "import sapien; from sapien.render import RenderSystem; sapien.Scene([RenderSystem()])"
-_OPENGL = "from robot_layouts.simulation.mujoco.library import mujoco; mujoco.GLContext(8, 8)"
+_OPENGL = "from robot_layouts.simulation.mujoco import mujoco; mujoco.GLContext(8, 8)"
 _PROBE_SECONDS = 60
 
 
@@ -87,7 +87,7 @@ class Observers:
         Args:
             simulation: Worlds that were built with visuals.
             cameras: Camera by its name in observations.
-            textures: What to take, some of `robot_layouts.simulation.scene.cameras.TEXTURES`.
+            textures: What to take, some of `robot_layouts.simulation.cameras.TEXTURES`.
 
         Raises:
             SimulationError: If the worlds have no visuals.

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.simulation.backend import Backend, Rows, open_backend
+from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.control.modes import ModeController
 from robot_layouts.simulation.maths import Array, Floats
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
 from robot_layouts.simulation.readout import Moment, ReadoutIndex
-from robot_layouts.simulation.scene.cameras import AnyCamera, View
-from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.state import State
+from robot_layouts.simulation.variation import Variation
 from robot_layouts.simulation.world import Placements, Visuals, World
 from robots import RobotDescriptor, SimulationError
 from robots.descriptor import IDENTITY, Quaternion

@@ -13,7 +13,7 @@ from typing_extensions import NotRequired, TypedDict
 from layouts import Layout
 from robot_layouts.core.bounds import FAR, checked_numbers, checked_whole, shown
 from robot_layouts.core.schema import FieldError, Object, check
-from robot_layouts.simulation.scene.cameras import (
+from robot_layouts.simulation.cameras import (
     DEFAULT_FOV,
     FIELD_OF_VIEW,
     SIZE,

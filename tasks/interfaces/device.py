@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
 from robot_layouts.core.bounds import checked_whole, shown
-from robot_layouts.simulation.mujoco_warp.arrays import beside
+from robot_layouts.simulation.mujoco_warp.state import beside
 from robots import ActionError, SimulationError, TaskError, UnknownNameError
 from tasks.engine.checks import ELAPSED, SEED, SOLVED, SUCCESS, checked_options, checked_seeds
 from tasks.engine.env import TaskEnv

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from robot_layouts.simulation.backend import (
@@ -22,7 +24,9 @@ from robot_layouts.simulation.backend import (
     Rows,
     Velocity,
 )
+from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
+from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.mujoco.contacts import (
     ArmWatcher,
     ForceReader,
@@ -30,21 +34,17 @@ from robot_layouts.simulation.mujoco.contacts import (
     presses_on_object,
 )
 from robot_layouts.simulation.mujoco.drives import JointDrives
-from robot_layouts.simulation.mujoco.extents import extent_of
-from robot_layouts.simulation.mujoco.library import mujoco
 from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, substeps_of
 from robot_layouts.simulation.mujoco.pictures import Pictures
-from robot_layouts.simulation.mujoco.threads import Threads
-from robot_layouts.simulation.mujoco.world import MujocoWorld
+from robot_layouts.simulation.mujoco.world import MujocoWorld, extent_of
 from robot_layouts.simulation.physics import PhysicsSettings
-from robot_layouts.simulation.scene.cameras import AnyCamera, View
-from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.solvers import (
     InverseKinematics,
     PointReach,
     TreeArm,
     TreeFollower,
 )
+from robot_layouts.simulation.variation import Variation
 from robot_layouts.simulation.world import Placements, World, WorldBody
 from robots import SimulationError
 
@@ -270,3 +270,24 @@ class MujocoBackend:
         (first, *_), layout = self.worlds, self.worlds[0].declared.layout
         owner = layout.owner(robot)
         return TreeArm(layout, robot, first.base_of(owner))
+
+
+class Threads:
+    """As many threads as torch may use in this process; those of a fork are its own."""
+
+    def __init__(self) -> None:
+        """Begin without threads."""
+        self._pool: ThreadPoolExecutor | None = None
+        self._made_for = (0, 0)
+
+    def run(self, works: Sequence[Callable[[], None]]) -> None:
+        """Do all of it, and return when all is done."""
+        count = torch.get_num_threads()
+        if count < 2 or len(works) < 2:
+            for work in works:
+                work()
+            return
+        if self._pool is None or self._made_for != (os.getpid(), count):
+            self._pool, self._made_for = ThreadPoolExecutor(count), (os.getpid(), count)
+        for _ in self._pool.map(lambda work: work(), works):
+            pass

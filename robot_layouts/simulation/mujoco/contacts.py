@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from robot_layouts.simulation.backend import Overlap, Pair, Part
 from robot_layouts.simulation.maths import Floats
-from robot_layouts.simulation.mujoco.library import mujoco
+from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.mujoco.world import MujocoWorld
 from robots.urdf.model import UrdfModel
 

@@ -17,13 +17,12 @@ from layouts.export.cell import ExportedCell, RobotSource, Standing
 from layouts.export.mjcf import mjcf_of
 from objects.shapes import Plane
 from robot_layouts.simulation.backend import Built, BuiltRobot, Part
+from robot_layouts.simulation.control.joint_positions import joint_speeds
 from robot_layouts.simulation.maths import Floats
-from robot_layouts.simulation.mujoco.bodies import PREFIX, BodyMaker
+from robot_layouts.simulation.mujoco import mujoco
+from robot_layouts.simulation.mujoco.bodies import PREFIX, BodyMaker, add_lamps
 from robot_layouts.simulation.mujoco.friction import set_friction
-from robot_layouts.simulation.mujoco.library import mujoco
-from robot_layouts.simulation.mujoco.visuals import add_lamps
 from robot_layouts.simulation.physics import PhysicsSettings
-from robot_layouts.simulation.speeds import joint_speeds
 from robot_layouts.simulation.world import World, part_name
 from robots import SimulationError
 

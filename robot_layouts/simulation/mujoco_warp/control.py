@@ -10,8 +10,7 @@ from torch import Tensor
 from layouts import Layout
 from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.control.modes import ModeController
-from robot_layouts.simulation.mujoco_warp.arrays import move_arrays
-from robot_layouts.simulation.mujoco_warp.state import DeviceIndex, DeviceState
+from robot_layouts.simulation.mujoco_warp.state import DeviceIndex, DeviceState, move_arrays
 from robot_layouts.simulation.mujoco_warp.tcp import DeviceTcp
 
 

@@ -12,8 +12,12 @@ from robot_layouts.kinematics.chain import Chain
 from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.simulation.control.joint_positions import DrivenGroup
 from robot_layouts.simulation.control.tcp import TcpController, inverse
-from robot_layouts.simulation.mujoco_warp.arrays import beside, move_arrays
-from robot_layouts.simulation.mujoco_warp.state import DeviceState, rotation_matrix
+from robot_layouts.simulation.mujoco_warp.state import (
+    DeviceState,
+    beside,
+    move_arrays,
+    rotation_matrix,
+)
 from robot_layouts.simulation.solvers import FOLLOWING, TreeFollower
 from robots import SimulationError
 

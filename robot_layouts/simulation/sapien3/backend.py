@@ -18,11 +18,11 @@ from robot_layouts.simulation.backend import (
     Rows,
     Velocity,
 )
+from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
-from robot_layouts.simulation.sapien3.arms import SapienArm
+from robot_layouts.simulation.sapien3.arms import PinocchioFollower, SapienArm
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
-from robot_layouts.simulation.sapien3.bodies import JointedBody
-from robot_layouts.simulation.sapien3.collision import described_shapes
+from robot_layouts.simulation.sapien3.bodies import JointedBody, described_shapes
 from robot_layouts.simulation.sapien3.contacts import (
     ArmContacts,
     PairForces,
@@ -32,11 +32,9 @@ from robot_layouts.simulation.sapien3.contacts import (
     presses_on_object,
 )
 from robot_layouts.simulation.sapien3.device import describe_graphics
-from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
 from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world, vary
-from robot_layouts.simulation.scene.cameras import AnyCamera, View
-from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.solvers import InverseKinematics, PointReach
+from robot_layouts.simulation.variation import Variation
 from robot_layouts.simulation.world import Placements, World
 from robots import RobotDescriptor, SimulationError
 

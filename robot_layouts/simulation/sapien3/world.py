@@ -16,10 +16,8 @@ from robot_layouts.simulation.sapien3.bodies import BuiltBody, build_bodies
 from robot_layouts.simulation.sapien3.device import expect_render_device, outlive_forks
 from robot_layouts.simulation.sapien3.exact_division import divide_exactly
 from robot_layouts.simulation.sapien3.robot import SimulatedRobot
-from robot_layouts.simulation.scene.looks import AS_DECLARED
-from robot_layouts.simulation.scene.parts import Part
-from robot_layouts.simulation.scene.variation import Variation
-from robot_layouts.simulation.world import Visuals, World, WorldBody
+from robot_layouts.simulation.variation import AS_DECLARED, Variation
+from robot_layouts.simulation.world import Part, Visuals, World, WorldBody
 from robots import RobotDescriptor, SimulationError
 
 _Value = TypeVar("_Value")
