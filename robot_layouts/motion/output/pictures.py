@@ -273,15 +273,15 @@ class _Picture:
 
     def _draw_distances(self, strip: Axes) -> None:
         times = np.linspace(0, self._motion.duration, SAMPLES)
-        found = self._scenes.distances(times)
+        distances, nearest = self._scenes.distances(times)
         self._begin_strip(strip, "distance (cm)")
-        if not found.nearest:
+        if not nearest:
             strip.text(
                 0.5, 0.5, "nothing is near", transform=strip.transAxes, color=FAINT, ha="center"
             )
             strip.set_yticks([])
             return
-        centimetres = 100 * found.least
+        centimetres = 100 * distances
         least = int(np.nanargmin(centimetres))
         strip.plot(times, centimetres, color=INK, linewidth=1.8)
         strip.plot(times[least], centimetres[least], "o", color=INK, markersize=5)
@@ -293,8 +293,8 @@ class _Picture:
                 "asked for", (self._motion.duration, asked), (-3, 2), textcoords="offset points",
                 color=LIMIT["color"], fontsize=7.5, ha="right",
             )  # fmt: skip
-        one, other = (name.replace("/", "'s ") for name in found.nearest)
-        near = found.least[least]
+        one, other = (name.replace("/", "'s ") for name in nearest)
+        near = distances[least]
         text = f"{'least' if near >= 0 else 'overlap'}: {length_text(abs(near))}, {one} and {other}"
         ink = INK if near >= 0 else LIMIT["color"]
         strip.set_title(text, loc="right", color=ink, fontsize=9, pad=3)

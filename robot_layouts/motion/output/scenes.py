@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats, transform
@@ -13,21 +11,6 @@ from robot_layouts.motion.model.bodies import CellSolid
 from robot_layouts.motion.model.obstacles import Held
 from robot_layouts.motion.timed_motion import TimedMotion
 from robots.urdf.tcp import find_tcp
-
-
-@dataclass(frozen=True, eq=False)
-class Distances:
-    """What comes how near over time.
-
-    Attributes:
-        times: (n,) (s).
-        least: Least distance of a robot from another or an obstacle, (n,) (m); NaN if all is far.
-        nearest: The two bodies that come nearest of all, by name; empty if none do.
-    """
-
-    times: Floats
-    least: Floats
-    nearest: tuple[str, ...]
 
 
 class Scenes:
@@ -85,18 +68,21 @@ class Scenes:
             ways[arm] = tcp.places(poses[:, own])
         return ways
 
-    def distances(self, times: Floats) -> Distances:
-        """Return how near robots come to each other and to what stands around."""
+    def distances(self, times: Floats) -> tuple[Floats, tuple[str, ...]]:
+        """Return how near robots come to each other and to what stands around.
+
+        Returns:
+            The least distance of a robot from another or an obstacle, (n,) (m); NaN if all is far.
+            And the names of the two bodies that come nearest of all; none if all is far.
+        """
         checker = self.cell.between_owners()
         contacts = [
             checker.nearest(state, time)
             for state, time in zip(self.states(times), times.tolist(), strict=True)
         ]
         least = np.array([np.nan if c is None else c.distance for c in contacts])
-        if np.isnan(least).all():
-            return Distances(times, least, ())
-        contact = contacts[int(np.nanargmin(least))]
-        return Distances(times, least, () if contact is None else tuple(contact.names))
+        contact = None if np.isnan(least).all() else contacts[int(np.nanargmin(least))]
+        return least, () if contact is None else contact.names
 
     def speeds(self, times: Floats) -> dict[str, Floats]:
         """Return by robot the largest share that a joint uses of its largest velocity, (n,)."""

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.motion.timing.paths import Path
 
 _FLAT = 1e-9  # slopes of coordinates that hardly move (s, as paths are measured)
 _FAST = 1e6  # squared speed that no limit bounds
@@ -26,20 +27,17 @@ class _Lines(NamedTuple):
     fastest: Floats
 
 
-def fastest_speeds(
-    grid: Floats, slopes: Floats, bends: Floats, speeds: Floats, accelerations: Floats
-) -> Floats:
+def fastest_speeds(path: Path, grid: Floats, speeds: Floats, accelerations: Floats) -> Floats:
     """Return the largest speed of the parameter at each point, from rest to rest, (m,).
 
     Args:
+        path: Without stops.
         grid: Parameters, (m,).
-        slopes: First derivatives of the coordinates by the parameter, (m, coordinates).
-        bends: Second ones, likewise.
         speeds: Largest of each coordinate, (coordinates,) (rad/s, m/s).
         accelerations: Likewise (rad/s², m/s²).
     """
     steps = np.diff(grid)
-    lines = _limits(steps, slopes, bends, speeds, accelerations)
+    lines = _limits(steps, path.at(grid, 1), path.at(grid, 2), speeds, accelerations)
     reachable = np.zeros(len(grid))
     for i in reversed(range(len(steps))):
         reachable[i] = _largest(lines, i, steps[i], reachable[i + 1])
