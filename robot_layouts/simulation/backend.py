@@ -18,13 +18,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pkgutil import resolve_name
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
+from robot_layouts.simulation.solvers import InverseKinematics as PoseSolver
+from robot_layouts.simulation.solvers import PointReach as PointSolver
 from robot_layouts.simulation.variation import Variation
 from robot_layouts.simulation.world import Part as Part
 from robot_layouts.simulation.world import Placements, World
@@ -34,7 +36,6 @@ Rows = Mapping[str, Floats]
 """State rows by name, a row for each world that is meant."""
 
 Joints = NDArray[np.float64]
-Numbers = Sequence[float] | NDArray[np.floating[Any]]
 
 
 class Readout(NamedTuple):
@@ -124,28 +125,6 @@ class Built:
     joints: Mapping[str, tuple[str, ...]]
 
 
-class PoseSolver(Protocol):
-    """Solves for the arm joints, in the order of ``joints``, that bring a TCP to a pose."""
-
-    joints: tuple[str, ...]
-
-    def forward(self, arm_qpos: Numbers, /) -> tuple[Joints, Joints]:
-        """Return where arm joints bring the TCP: position (3,) (m), quaternion (4,) wxyz, world."""
-        ...
-
-    def solve(
-        self, position: Numbers, quaternion: Numbers, start_qpos: Numbers, /
-    ) -> Joints | None:
-        """Return arm joints near all joints ``start_qpos``, or None if none were found."""
-        ...
-
-    def solutions(
-        self, position: Numbers, quaternion: Numbers, start_qpos: Numbers, /
-    ) -> list[Joints]:
-        """Return all that were found, the one with the shortest way first."""
-        ...
-
-
 class PoseFollower(Protocol):
     """Finds the joints of an arm that bring a link to a pose, from where they are."""
 
@@ -157,30 +136,6 @@ class PoseFollower(Protocol):
             quaternion: Likewise, wxyz.
             qpos: All joints of the robot in its descriptor's order, (dof,) (rad, m).
         """
-        ...
-
-
-class PointSolver(Protocol):
-    """Solves for the arm joints, in the order of ``joints``, that bring a point of a TCP link."""
-
-    joints: tuple[str, ...]
-
-    def arm(self, qpos: Joints, /) -> Joints:
-        """Pick the arm's joints out of all in the descriptor's order."""
-        ...
-
-    def forward(self, arm: Joints, /) -> tuple[Joints, Joints]:
-        """Return where arm joints bring the TCP link: position (3,) (m), quaternion (4,) wxyz."""
-        ...
-
-    def place_of(self, point: Joints, arm: Joints, /) -> Joints:
-        """Return where arm joints bring a point of the TCP link, (3,) (m), world."""
-        ...
-
-    def solve(
-        self, point: Joints, place: Joints, start: Joints, fixed: Sequence[str] = ()
-    ) -> Joints | None:
-        """Return arm joints near ``start`` that bring a point to a place, or None if none do."""
         ...
 
 

@@ -17,9 +17,7 @@ from robot_layouts.simulation.backend import (
     Overlap,
     Pair,
     Part,
-    PointSolver,
     PoseFollower,
-    PoseSolver,
     Readout,
     Rows,
     Velocity,
@@ -195,11 +193,11 @@ class MujocoBackend:
         """Return what segmentation's numbers stand for; see `Backend`."""
         return dict(self._index.parts)
 
-    def inverse_kinematics(self, robot: str) -> PoseSolver:
+    def inverse_kinematics(self, robot: str) -> InverseKinematics:
         """Return a solver for poses; see `Backend`."""
         return InverseKinematics(self._arm(robot))
 
-    def point_reach(self, robot: str) -> PointSolver:
+    def point_reach(self, robot: str) -> PointReach:
         """Return a solver for points; see `Backend`."""
         return PointReach(self._arm(robot))
 
