@@ -1,4 +1,4 @@
-"""A cell: all robots of a layout, what stands around them, what they hold, and who keeps how far."""
+"""A cell: robots of a layout, what is around them or held, and how far all of it keeps apart."""
 
 from __future__ import annotations
 

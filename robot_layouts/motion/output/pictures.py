@@ -15,6 +15,7 @@ from layouts.preview import TABLE
 from layouts.validation.findings import length_text
 from robot_layouts.core.errors import MotionError
 from robot_layouts.core.figures import COLOURS, FAINT, INK, SUPPORTED, blank_figure
+from robot_layouts.core.importing import optional
 from robot_layouts.core.progress import Progress
 from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import forward
@@ -22,7 +23,6 @@ from robot_layouts.kinematics.rotations import Floats, transform
 from robot_layouts.motion.model.bodies import CellSolid
 from robot_layouts.motion.output.scenes import Scenes
 from robot_layouts.motion.timed_motion import TimedMotion
-from robots import MissingPackageError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -323,12 +323,7 @@ class _Picture:
 
 
 def _write_frames(frames: Sequence[Any], path: Path, kind: str) -> None:
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise MissingPackageError(
-            "a moving picture needs pillow: pip install 'robot-layouts[view]'"
-        ) from error
+    Image = optional("PIL.Image", "a moving picture needs pillow", "view")
     first, *others = [Image.fromarray(frame) for frame in frames]
     milliseconds = [1000 // FRAMES] * len(others) + [int(1000 * REST)]
     settings: dict[str, Any] = {"quality": 80, "method": 4} if kind == "webp" else {}

@@ -13,6 +13,7 @@ import numpy as np
 from layouts import Layout
 from robot_layouts.core.bounds import checked_number, shown
 from robot_layouts.core.errors import MissingPackageError, MotionError
+from robot_layouts.core.importing import optional
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.timing.paths import Path
 from robot_layouts.motion.timing.sweeps import fastest_speeds
@@ -248,13 +249,8 @@ def import_toppra() -> None:
     Raises:
         MissingPackageError: If it is not installed.
     """
-    try:
-        with _quiet():
-            import toppra  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError as error:
-        raise MissingPackageError(
-            "timing a motion needs toppra: pip install 'robot-layouts[motion]'"
-        ) from error
+    with _quiet():
+        optional("toppra", "timing a motion needs toppra", "motion")
 
 
 @contextmanager
