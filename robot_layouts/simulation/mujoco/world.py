@@ -13,8 +13,7 @@ from layouts.frames import Pose
 from robot_layouts.kinematics.rotations import rotation_of
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.mujoco import mujoco
-from robot_layouts.simulation.mujoco.friction import vary_friction
-from robot_layouts.simulation.mujoco.model import Inventory
+from robot_layouts.simulation.mujoco.model import Inventory, vary_friction
 from robot_layouts.simulation.variation import AS_DECLARED, Variation
 from robot_layouts.simulation.world import World, WorldBody
 from robots import SimulationError

@@ -15,9 +15,12 @@ from torch import Tensor
 from robot_layouts.simulation.backend import Pair, Readout, Velocity
 from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.mujoco.world import MujocoWorld
-from robot_layouts.simulation.mujoco_warp.contacts import ContactForces
-from robot_layouts.simulation.mujoco_warp.library import mujoco_warp, warp
-from robot_layouts.simulation.mujoco_warp.linkages import LinkageDrives
+from robot_layouts.simulation.mujoco_warp.kernels import (
+    ContactForces,
+    LinkageDrives,
+    mujoco_warp,
+    warp,
+)
 from robot_layouts.simulation.mujoco_warp.state import beside
 from robots import SimulationError
 
