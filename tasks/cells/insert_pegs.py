@@ -91,12 +91,10 @@ class CellInsertPegs(CellTask):
         level = state.rotation("yoke")[:, 2, 2] >= cos(LEVEL)
         up = held & level & (state.position("yoke")[:, 2] >= HEIGHT)
         inside = self.count(
-            [
-                self.is_left_in(
-                    state, arm, f"peg_{arm}", "yoke", (-NEAR, y - NEAR, 0), (NEAR, y + NEAR, IN)
-                )
-                for arm, y in SIDES.items()
-            ]
+            self.is_left_in(
+                state, arm, f"peg_{arm}", "yoke", (-NEAR, y - NEAR, 0), (NEAR, y + NEAR, IN)
+            )
+            for arm, y in SIDES.items()
         )
         return {
             "is_held": held,

@@ -12,7 +12,6 @@ from tasks import (
     Object,
     State,
     World,
-    is_at_rest,
     register_task,
 )
 from tasks.maths import Array, Floats, norm
@@ -59,11 +58,8 @@ class CellMountGears(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: every gear on its shaft, at rest and let go."""
-        held = [state.is_grasping(arm, f"gear_{arm}") for arm in self.arms]
-        rest = [is_at_rest(state, f"gear_{arm}") for arm in self.arms]
-        ways = zip(self.ways(state), rest, held, strict=True)
-        on = self.count([(way <= ON) & r & ~h for way, r, h in ways])
-        return {"is_one_held": self.count(held) >= 1, **self.passed(on, 1, 2, 3)}
+        held, on = self.held_and_left(state, {a: f"gear_{a}" for a in self.arms}, ON)
+        return {"is_one_held": held >= 1, **self.passed(on, 1, 2, 3)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the gears to their seats."""

@@ -92,10 +92,8 @@ class CellPackKit(CellTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all are in their pockets, let go."""
         done = self.count(
-            [
-                self.is_left_in(state, arm, part, f"pocket_{arm}", LOW, HIGH)
-                for arm, part in PARTS.items()
-            ]
+            self.is_left_in(state, arm, part, f"pocket_{arm}", LOW, HIGH)
+            for arm, part in PARTS.items()
         )
         return self.passed(done, 1, 2, 3, 4)
 

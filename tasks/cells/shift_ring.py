@@ -18,7 +18,6 @@ from tasks import (
     State,
     World,
     add_target,
-    is_at_rest,
     register_task,
 )
 from tasks.maths import Array, Floats
@@ -71,12 +70,9 @@ class CellShiftRing(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: every cube rests in its arm's zone, let go."""
-        held = [state.is_grasping(arm, f"cube_{arm}") for arm in self.arms]
-        rests = [is_at_rest(state, f"cube_{arm}") for arm in self.arms]
-        near = [way <= RADIUS for way in self.ways(state)]
-        done = self.count([n & r & ~h for n, r, h in zip(near, rests, held, strict=True)])
+        held, done = self.held_and_left(state, {a: f"cube_{a}" for a in self.arms}, RADIUS)
         every = len(self.arms)
-        return {"is_one_held": self.count(held) >= 1, **self.passed(done, 1, every / 2, every)}
+        return {"is_one_held": held >= 1, **self.passed(done, 1, every / 2, every)}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCPs, the cubes, and their ways to their zones."""

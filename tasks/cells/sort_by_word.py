@@ -18,7 +18,6 @@ from tasks import (
     Needs,
     State,
     World,
-    is_at_rest,
     register_task,
 )
 from tasks.maths import Array, Floats
@@ -65,14 +64,7 @@ class CellSortByWord(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: every cube on its pad, at rest and let go."""
-        done = self.count(
-            [
-                (way <= PAD)
-                & is_at_rest(state, f"cube_{arm}")
-                & ~state.is_grasping(arm, f"cube_{arm}")
-                for arm, way in zip(self.arms, self.ways(state), strict=True)
-            ]
-        )
+        _, done = self.held_and_left(state, {arm: f"cube_{arm}" for arm in self.arms}, PAD)
         return self.passed(done, 1, 2, 3)
 
     def ways(self, state: State) -> list[Floats]:

@@ -91,10 +91,7 @@ class CellUnloadTurntable(CellTask):
         """Success: all are in their boxes, let go."""
         held = [state.is_grasping(arm, f"cube_{arm}") for arm in self.arms]
         done = self.count(
-            [
-                self.is_within(state, f"cube_{arm}", f"box_{arm}", LOW, UP) & ~holds
-                for arm, holds in zip(self.arms, held, strict=True)
-            ]
+            self.is_left_in(state, arm, f"cube_{arm}", f"box_{arm}", LOW, UP) for arm in self.arms
         )
         return {"is_one_held": self.count(held) >= 1, **self.passed(done, 1, 2, 3)}
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import atan2, hypot
 from typing import Any, ClassVar
 
@@ -13,7 +13,7 @@ from tasks.engine.env import MultiRobotTask
 from tasks.engine.task import Info
 from tasks.language.bodies import Body, Object, WideTable
 from tasks.language.randomness import EpisodeRandom
-from tasks.language.terms import closeness, inverse, transform
+from tasks.language.terms import closeness, inverse, is_at_rest, transform
 
 OF_STAGES = 0.6  # of the reward
 
@@ -151,7 +151,22 @@ class CellTask(MultiRobotTask):
         """
         return self.is_within(state, body, other, low, high) & ~state.is_grasping(arm, body)
 
-    def count(self, flags: Sequence[Array]) -> Floats:
+    def held_and_left(
+        self, state: State, bodies: Mapping[str, str], near: float
+    ) -> tuple[Floats, Floats]:
+        """Return how many bodies arms hold, and how many rest at the ends of `ways`, let go, (N,).
+
+        Args:
+            state: The state.
+            bodies: By arm, what it brings, in the order of `ways`.
+            near: How near to its end a way is to be (m).
+        """
+        held = [state.is_grasping(arm, body) for arm, body in bodies.items()]
+        ended = zip(bodies.values(), self.ways(state), held, strict=True)
+        left = [(way <= near) & is_at_rest(state, body) & ~holds for body, way, holds in ended]
+        return self.count(held), self.count(left)
+
+    def count(self, flags: Iterable[Array]) -> Floats:
         """Return how many of some flags, each (N,) bool, are true, (N,)."""
         total: Any = sum(map(floats, flags))
         return total
