@@ -88,7 +88,7 @@ class Simulation:
             self.modes = ModeController(layout, self._controller)
         self.worlds: list[World] = []
         self._fresh = set(self._everywhere)  # worlds that have not moved since their reset
-        self._build(self._everywhere, build)
+        self.rebuild(self._everywhere, build)
 
     def rebuild(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
         """Build some worlds anew; what PhysX remembered of their past is gone.
@@ -98,7 +98,16 @@ class Simulation:
             build: As when the simulation was made. It is not kept from then: a task's own would
                 keep the task, and with it these worlds, until Python looks for circles.
         """
-        self._build(env_ids, build)
+        fresh = {i: self._describe(i, build) for i in env_ids}
+        self._placements.forget(env_ids)
+        _expect_alike({**dict(enumerate(self.worlds)), **fresh})
+        built = self.backend.build(fresh)
+        self.worlds = [fresh.get(i) or self.worlds[i] for i in self._everywhere]
+        self.index = ReadoutIndex(self.layout, built)
+        self._fresh.update(env_ids)
+        if self.modes is not None:
+            self.modes.build(self.backend, self.index)
+        self._change()
 
     def descriptor(self, robot: str) -> RobotDescriptor:
         """Return what the robot of that name is."""
@@ -295,18 +304,6 @@ class Simulation:
         )
         build(world, index)
         return world
-
-    def _build(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
-        fresh = {i: self._describe(i, build) for i in env_ids}
-        self._placements.forget(env_ids)
-        _expect_alike({**dict(enumerate(self.worlds)), **fresh})
-        built = self.backend.build(fresh)
-        self.worlds = [fresh.get(i) or self.worlds[i] for i in self._everywhere]
-        self.index = ReadoutIndex(self.layout, built)
-        self._fresh.update(env_ids)
-        if self.modes is not None:
-            self.modes.build(self.backend, self.index)
-        self._change()
 
 
 def _expect_alike(worlds: Mapping[int, World]) -> None:

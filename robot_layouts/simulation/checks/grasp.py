@@ -200,15 +200,8 @@ class _Gripper:
         return ends.mean(axis=0) - _DEEP * side * ahead, quaternion_of(turn)
 
     def _posture(self, at: int) -> Postures:
-        hulls = self._hulls
-        return Postures(
-            hulls.name,
-            hulls.hulls,
-            hulls.links,
-            hulls.poses[at : at + 1],
-            hulls.low[at : at + 1],
-            hulls.high[at : at + 1],
-        )
+        hulls, one = self._hulls, slice(at, at + 1)
+        return replace(hulls, poses=hulls.poses[one], low=hulls.low[one], high=hulls.high[one])
 
 
 CUBE = "cube"  # its name in the world
