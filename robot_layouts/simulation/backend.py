@@ -18,11 +18,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pkgutil import resolve_name
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from layouts import Layout
 from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
 from robot_layouts.simulation.solvers import InverseKinematics as PoseSolver
@@ -30,7 +31,8 @@ from robot_layouts.simulation.solvers import PointReach as PointSolver
 from robot_layouts.simulation.variation import Variation
 from robot_layouts.simulation.world import Part as Part
 from robot_layouts.simulation.world import Placements, World
-from robots import UnknownNameError
+from robots import SimulationError, UnknownNameError
+from robots.urdf.model import UrdfModel
 
 Rows = Mapping[str, Floats]
 """State rows by name, a row for each world that is meant."""
@@ -326,3 +328,86 @@ class Backend(Protocol):
     def collision_shapes(self, env: int, body: str) -> list[tuple[str | float | list[float], ...]]:
         """Return the kind, pose and sizes of what a body collides with, as it was built."""
         ...
+
+
+class EachWorld:
+    """What backends share whose worlds are things of their own, each with the same verbs.
+
+    Attributes:
+        worlds: The worlds.
+    """
+
+    worlds: list[Any]
+
+    def __init__(self) -> None:
+        """Begin without worlds."""
+        self.worlds = []
+        self._watchers: dict[Any, Any] | None = None  # what `seen` which arms touch, by world
+
+    def _keep(self, built: Mapping[int, Any]) -> None:
+        """Let worlds that were built take the place of earlier ones."""
+        count = max(len(self.worlds), len(built))
+        self.worlds = [built.get(i) or self.worlds[i] for i in range(count)]
+
+    def _arm(self, robot: str) -> Any:
+        """Return what solvers are to move: an arm where it stands in the first world."""
+        raise NotImplementedError
+
+    def clear(self, env_ids: Sequence[int]) -> None:
+        """Begin a reset; see `Backend`."""
+        for i in env_ids:
+            self.worlds[i].clear()
+
+    def vary(self, variations: Mapping[int, Variation]) -> None:
+        """Let worlds differ from what was built; see `Backend`."""
+        for i, variation in variations.items():
+            self.worlds[i].vary(variation)
+
+    def place(self, placements: Placements) -> None:
+        """Stand robots and move bodies; see `Backend`."""
+        for name, rows in placements.robots.items():
+            for i, qpos in rows.items():
+                self.worlds[i].stand(name, qpos)
+        for name, rows in placements.bodies.items():
+            for i, pose in rows.items():
+                self.worlds[i].place(name, pose)
+        for name, rows in placements.joints.items():
+            for i, positions in rows.items():
+                self.worlds[i].set_joints(name, positions)
+
+    def inverse_kinematics(self, robot: str) -> PoseSolver:
+        """Return a solver for poses; see `Backend`."""
+        return PoseSolver(self._arm(robot))
+
+    def point_reach(self, robot: str) -> PointSolver:
+        """Return a solver for points; see `Backend`."""
+        return PointSolver(self._arm(robot))
+
+    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
+        """Return which links of different arms touched since it was last asked; see `Backend`."""
+        if self._watchers is None:
+            raise SimulationError("contacts between arms are not watched; call watch_arms() first")
+        watcher = self._watchers[self.worlds[env]]
+        seen, watcher.seen = list(watcher.seen), {}
+        return seen
+
+
+def arms_of(layout: Layout, models: Mapping[str, UrdfModel]) -> dict[Part, tuple[str, str]]:
+    """Return the arm of each link: the robot and, if it has limbs, the limb.
+
+    A link is of the limb that has the last joint on the way to it; what is of no limb is left out
+    if there are limbs.
+
+    Args:
+        layout: The robots.
+        models: What their files describe, by their names in the layout.
+    """
+    found: dict[Part, tuple[str, str]] = {}
+    for name, model in models.items():
+        robot = layout[name].robot
+        limbs = {joint: limb for limb in robot.limbs for joint in robot.parts[limb].joints}
+        for link in model.links:
+            own = [limbs[joint.name] for joint in model.path_to(link) if joint.name in limbs]
+            if own or not limbs:
+                found[Part(name, link)] = name, own[-1] if own else ""
+    return found
