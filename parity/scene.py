@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from parity.lockstep import Snapshot, state_dict
 from parity.native import quiet
-from robot_layouts.simulation.sapien3.collision import described_shapes
+from robot_layouts.simulation.sapien3.bodies import described_shapes
 from robots import RobotLayoutsError
 from tasks import TaskEnv
 

@@ -18,7 +18,7 @@ from rich.table import Table
 from layouts import Layout
 from robot_layouts.simulation import Camera
 from robot_layouts.simulation.backend import CLONING
-from robot_layouts.simulation.scene.cameras import AnyCamera, field_of_view, lens_of, ridden
+from robot_layouts.simulation.cameras import AnyCamera, field_of_view, lens_of, ridden
 from robots import TaskError
 from tasks.engine.cameras import cameras_of
 from tasks.engine.env import MultiRobotTask, TaskEnv
@@ -29,6 +29,7 @@ PARITY_RESULTS = Path(__file__).with_name("parity.json")
 UNKNOWN = "–"
 LONG = 42  # letters
 OURS = "robot-layouts"  # where built-in tasks come from
+OWN_SOURCE = f"{OURS}; geometry and rewards are its own"  # of those that follow no other's file
 
 _SUCCESS = "Success:"
 _SECTIONS = ("Attributes:", "Args:", "Note:", "Example:", "Examples:")  # of Google docstrings
@@ -210,7 +211,7 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
         ("success", text.success),
         ("episode", f"{env.max_episode_steps} steps, {env.scenario.control_frequency:g} per s"),
         ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),
-        ("source", cls.source),
+        ("source", cls.source or ("" if origin(cls.task_id) else OWN_SOURCE)),
         ("other names", ", ".join([*_full_name(cls), *other_names(cls)])),
         ("from", origin(cls.task_id) or OURS),
         ("parity", _parity(env)),

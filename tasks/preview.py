@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.core.bounds import checked_whole
+from robot_layouts.core.importing import optional
 from robot_layouts.core.writing import written_whole
+from robot_layouts.simulation.cameras import AnyCamera, Camera, camera_name, lens_of
 from robot_layouts.simulation.rendering import FIELD_OF_VIEW
-from robot_layouts.simulation.scene.cameras import AnyCamera, Camera, camera_name, lens_of
-from robots import MissingPackageError, TaskError, UnknownNameError
+from robots import TaskError, UnknownNameError
 from tasks.engine.cameras import cameras_of, configured, resized
 from tasks.engine.env import TaskEnv
 
@@ -94,11 +95,7 @@ def expect_format(path: str | os.PathLike[str]) -> Path:
     target = Path(path)
     if target.suffix.lower() not in SUPPORTED:
         raise TaskError(f"{target} must end in one of {', '.join(SUPPORTED)}")
-    try:
-        import PIL  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError:
-        install = "pip install 'robot-layouts[preview]'"
-        raise MissingPackageError(f"a preview needs Pillow: {install}") from None
+    optional("PIL", "a preview needs Pillow", "preview")
     return target
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from layouts.viewer import ShownCell, ShownMotion, Thing
 from layouts.visuals import Visual, coloured, load_meshes
-from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
-from objects.solids import hull_triangles
+from objects.shapes import Mesh, Plane, Shape
+from objects.solids import surface
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
 from robots import TaskError
 from tasks.engine.env import TaskEnv
@@ -84,37 +83,19 @@ def body_parts(shapes: tuple[Shape, ...]) -> tuple[Visual, ...]:
 
 
 def _parts(shape: Shape) -> list[Visual]:
-    pose = pose_matrix(shape.position, shape.quaternion)
-    meshes = _meshes(shape)
-    for mesh in meshes:
-        mesh.apply_transform(pose)
-    return [coloured(mesh, shape.color) for mesh in meshes]
-
-
-def _meshes(shape: Shape) -> list[Any]:
     import trimesh
 
-    along_x = trimesh.transformations.rotation_matrix(np.pi / 2, [0.0, 1.0, 0.0])
+    pose = pose_matrix(shape.position, shape.quaternion)
     match shape:
-        case Box():
-            return [trimesh.creation.box(2 * np.array(shape.half_size))]
-        case Sphere():
-            return [trimesh.creation.icosphere(subdivisions=3, radius=shape.radius)]
-        case Cylinder():
-            length = 2 * shape.half_length
-            return [trimesh.creation.cylinder(shape.radius, length, transform=along_x)]
-        case Capsule():
-            capsule = trimesh.creation.capsule(2 * shape.half_length, shape.radius)
-            return [capsule.apply_transform(along_x)]
         case Plane():
             half = PLANE_SIZE / 2
             corners = [(0.0, y, z) for y, z in ((-half, -half), (half, -half), (half, half))]
             corners.append((0.0, -half, half))
-            return [trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]])]
-        case ConvexHull():
-            return [trimesh.Trimesh(shape.corners, hull_triangles(shape.corners), process=False)]
+            plane = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]])
+            meshes = [plane.apply_transform(pose)]
         case Mesh():
             meshes = load_meshes(str(shape.file), "a body of the task")
-            return [mesh.apply_scale(shape.scale) for mesh in meshes]
+            meshes = [mesh.apply_scale(shape.scale).apply_transform(pose) for mesh in meshes]
         case _:
-            raise TypeError(f"no picture for {type(shape).__name__}")
+            meshes = [trimesh.Trimesh(*surface(shape), process=False)]
+    return [coloured(mesh, shape.color) for mesh in meshes]

@@ -19,7 +19,7 @@ NEED_MORE = (
     "layouts.export.usd",
     *(
         f"robot_layouts.simulation.mujoco_warp.{name}"
-        for name in ("contacts", "library", "linkages", "simulation", "worlds")
+        for name in ("kernels", "simulation", "worlds")
     ),
 )
 

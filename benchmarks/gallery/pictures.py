@@ -22,9 +22,9 @@ from robot_layouts.core.writing import write_whole
 from robot_layouts.experts import find_expert
 from robot_layouts.kinematics.quaternions import multiplied, normalised, yaw_quaternion
 from robot_layouts.simulation import Camera
+from robot_layouts.simulation.cameras import View
 from robot_layouts.simulation.checks.overlaps import empty, stand
 from robot_layouts.simulation.rendering import vulkan_problem
-from robot_layouts.simulation.scene.cameras import View
 from robot_layouts.simulation.simulation import Simulation
 from robots import DescriptorError, MissingPackageError, RobotDescriptor, RobotRegistry
 from robots.assets.locator import LocalUrdf, UrdfLocator

@@ -16,7 +16,7 @@ from layouts import Layout, ring, search, table
 from robot_layouts.core.writing import write_whole
 from robot_layouts.experts import find_expert
 from robot_layouts.motion import TcpGoal, plan
-from robot_layouts.simulation.scene.cameras import Camera
+from robot_layouts.simulation.cameras import Camera
 from robots import UnknownNameError
 from tasks.episode import play
 

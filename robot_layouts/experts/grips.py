@@ -10,7 +10,7 @@ import numpy as np
 
 from layouts import single
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, quaternion_of
-from robot_layouts.simulation.checks.closing import Closing
+from robot_layouts.simulation.checks.grasp import Closing
 from robot_layouts.simulation.checks.trial import NAME
 from robots import DescriptorError, RobotDescriptor
 from robots.gripper_motion import GripperMotion, gripper_motion, link_tree

@@ -8,7 +8,7 @@ from layouts import Layout
 from robot_layouts.core.errors import MissingPackageError
 from robot_layouts.motion.collision.cell import cell_of
 from robot_layouts.motion.collision.checker import Checker
-from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.world import Part
 from robots.bodies.hulls import require_packages
 from tasks import TaskEnv
 

@@ -97,7 +97,7 @@ def show(file: str, *, page: Page) -> None:
     Raises:
         RobotLayoutsError: If it cannot be read, served or saved.
     """
-    from robot_layouts.motion.output.page import motion_cell
+    from robot_layouts.motion.output.scenes import motion_cell
 
     motion = Motion.load(file)
     page.show(lambda: motion_cell(motion, file))

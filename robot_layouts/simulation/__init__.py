@@ -12,8 +12,8 @@ from robot_layouts.core.own_packages import expect_own
 expect_own("robots", "objects", "layouts")
 
 from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
+from robot_layouts.simulation.cameras import Camera
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
-from robot_layouts.simulation.scene.cameras import Camera
 from robot_layouts.simulation.simulation import Simulation
 from robot_layouts.simulation.state import State
 from robot_layouts.simulation.tabletop import add_table

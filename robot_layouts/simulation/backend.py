@@ -23,18 +23,21 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from layouts import Layout
+from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
-from robot_layouts.simulation.scene.cameras import AnyCamera, View
-from robot_layouts.simulation.scene.parts import Part as Part
-from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.solvers import InverseKinematics as PoseSolver
+from robot_layouts.simulation.solvers import PointReach as PointSolver
+from robot_layouts.simulation.variation import Variation
+from robot_layouts.simulation.world import Part as Part
 from robot_layouts.simulation.world import Placements, World
-from robots import UnknownNameError
+from robots import SimulationError, UnknownNameError
+from robots.urdf.model import UrdfModel
 
 Rows = Mapping[str, Floats]
 """State rows by name, a row for each world that is meant."""
 
 Joints = NDArray[np.float64]
-Numbers = Sequence[float] | NDArray[np.floating[Any]]
 
 
 class Readout(NamedTuple):
@@ -124,28 +127,6 @@ class Built:
     joints: Mapping[str, tuple[str, ...]]
 
 
-class PoseSolver(Protocol):
-    """Solves for the arm joints, in the order of ``joints``, that bring a TCP to a pose."""
-
-    joints: tuple[str, ...]
-
-    def forward(self, arm_qpos: Numbers, /) -> tuple[Joints, Joints]:
-        """Return where arm joints bring the TCP: position (3,) (m), quaternion (4,) wxyz, world."""
-        ...
-
-    def solve(
-        self, position: Numbers, quaternion: Numbers, start_qpos: Numbers, /
-    ) -> Joints | None:
-        """Return arm joints near all joints ``start_qpos``, or None if none were found."""
-        ...
-
-    def solutions(
-        self, position: Numbers, quaternion: Numbers, start_qpos: Numbers, /
-    ) -> list[Joints]:
-        """Return all that were found, the one with the shortest way first."""
-        ...
-
-
 class PoseFollower(Protocol):
     """Finds the joints of an arm that bring a link to a pose, from where they are."""
 
@@ -157,30 +138,6 @@ class PoseFollower(Protocol):
             quaternion: Likewise, wxyz.
             qpos: All joints of the robot in its descriptor's order, (dof,) (rad, m).
         """
-        ...
-
-
-class PointSolver(Protocol):
-    """Solves for the arm joints, in the order of ``joints``, that bring a point of a TCP link."""
-
-    joints: tuple[str, ...]
-
-    def arm(self, qpos: Joints, /) -> Joints:
-        """Pick the arm's joints out of all in the descriptor's order."""
-        ...
-
-    def forward(self, arm: Joints, /) -> tuple[Joints, Joints]:
-        """Return where arm joints bring the TCP link: position (3,) (m), quaternion (4,) wxyz."""
-        ...
-
-    def place_of(self, point: Joints, arm: Joints, /) -> Joints:
-        """Return where arm joints bring a point of the TCP link, (3,) (m), world."""
-        ...
-
-    def solve(
-        self, point: Joints, place: Joints, start: Joints, fixed: Sequence[str] = ()
-    ) -> Joints | None:
-        """Return arm joints near ``start`` that bring a point to a place, or None if none do."""
         ...
 
 
@@ -371,3 +328,86 @@ class Backend(Protocol):
     def collision_shapes(self, env: int, body: str) -> list[tuple[str | float | list[float], ...]]:
         """Return the kind, pose and sizes of what a body collides with, as it was built."""
         ...
+
+
+class EachWorld:
+    """What backends share whose worlds are things of their own, each with the same verbs.
+
+    Attributes:
+        worlds: The worlds.
+    """
+
+    worlds: list[Any]
+
+    def __init__(self) -> None:
+        """Begin without worlds."""
+        self.worlds = []
+        self._watchers: dict[Any, Any] | None = None  # what `seen` which arms touch, by world
+
+    def _keep(self, built: Mapping[int, Any]) -> None:
+        """Let worlds that were built take the place of earlier ones."""
+        count = max(len(self.worlds), len(built))
+        self.worlds = [built.get(i) or self.worlds[i] for i in range(count)]
+
+    def _arm(self, robot: str) -> Any:
+        """Return what solvers are to move: an arm where it stands in the first world."""
+        raise NotImplementedError
+
+    def clear(self, env_ids: Sequence[int]) -> None:
+        """Begin a reset; see `Backend`."""
+        for i in env_ids:
+            self.worlds[i].clear()
+
+    def vary(self, variations: Mapping[int, Variation]) -> None:
+        """Let worlds differ from what was built; see `Backend`."""
+        for i, variation in variations.items():
+            self.worlds[i].vary(variation)
+
+    def place(self, placements: Placements) -> None:
+        """Stand robots and move bodies; see `Backend`."""
+        for name, rows in placements.robots.items():
+            for i, qpos in rows.items():
+                self.worlds[i].stand(name, qpos)
+        for name, rows in placements.bodies.items():
+            for i, pose in rows.items():
+                self.worlds[i].place(name, pose)
+        for name, rows in placements.joints.items():
+            for i, positions in rows.items():
+                self.worlds[i].set_joints(name, positions)
+
+    def inverse_kinematics(self, robot: str) -> PoseSolver:
+        """Return a solver for poses; see `Backend`."""
+        return PoseSolver(self._arm(robot))
+
+    def point_reach(self, robot: str) -> PointSolver:
+        """Return a solver for points; see `Backend`."""
+        return PointSolver(self._arm(robot))
+
+    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
+        """Return which links of different arms touched since it was last asked; see `Backend`."""
+        if self._watchers is None:
+            raise SimulationError("contacts between arms are not watched; call watch_arms() first")
+        watcher = self._watchers[self.worlds[env]]
+        seen, watcher.seen = list(watcher.seen), {}
+        return seen
+
+
+def arms_of(layout: Layout, models: Mapping[str, UrdfModel]) -> dict[Part, tuple[str, str]]:
+    """Return the arm of each link: the robot and, if it has limbs, the limb.
+
+    A link is of the limb that has the last joint on the way to it; what is of no limb is left out
+    if there are limbs.
+
+    Args:
+        layout: The robots.
+        models: What their files describe, by their names in the layout.
+    """
+    found: dict[Part, tuple[str, str]] = {}
+    for name, model in models.items():
+        robot = layout[name].robot
+        limbs = {joint: limb for limb in robot.limbs for joint in robot.parts[limb].joints}
+        for link in model.links:
+            own = [limbs[joint.name] for joint in model.path_to(link) if joint.name in limbs]
+            if own or not limbs:
+                found[Part(name, link)] = name, own[-1] if own else ""
+    return found

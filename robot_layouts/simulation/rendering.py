@@ -5,17 +5,16 @@ from __future__ import annotations
 import functools
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.simulation.scene.cameras import (
+from robot_layouts.simulation.cameras import (
     FIELD_OF_VIEW,
     SIZE,
     AnyCamera,
     Camera,
-    Texture,
     View,
     ridden,
 )
@@ -24,8 +23,62 @@ from robots import SimulationError
 from robots.descriptor import Vector3
 
 _VULKAN = "import sapien; from sapien.render import RenderSystem; sapien.Scene([RenderSystem()])"
-_OPENGL = "from robot_layouts.simulation.mujoco.library import mujoco; mujoco.GLContext(8, 8)"
+_OPENGL = "from robot_layouts.simulation.mujoco import mujoco; mujoco.GLContext(8, 8)"
 _PROBE_SECONDS = 60
+
+
+class Observers:
+    """Cameras that observe: in every world the same ones, which need not see its markers."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        cameras: Mapping[str, AnyCamera],
+        textures: Sequence[str],
+        *,
+        markers: bool = False,
+    ) -> None:
+        """Remember what to look with; cameras are set up when a world is first looked at.
+
+        Args:
+            simulation: Worlds that were built with visuals.
+            cameras: Camera by its name in observations.
+            textures: What to take, some of `robot_layouts.simulation.cameras.TEXTURES`.
+            markers: Whether they see markers.
+
+        Raises:
+            SimulationError: If the worlds have no visuals.
+            UnknownNameError: If a camera rides on a robot, or a link of it, that is not there.
+        """
+        if not all(world.visuals for world in simulation.worlds):
+            raise SimulationError("these worlds have nothing to draw; build them with visuals=True")
+        self._simulation, self._cameras, self._textures = simulation, dict(cameras), tuple(textures)
+        self._markers = markers
+        for robot, link in filter(None, map(ridden, self._cameras.values())):
+            simulation.index.robots[robot]
+            simulation.index.links[robot].expect(link)
+
+    def look(self, env: int) -> dict[str, View]:
+        """Return what every camera sees in one world now, by its name.
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        return self.begin(env)()
+
+    def begin(self, env: int) -> Callable[[], dict[str, View]]:
+        """Begin to draw one world, which may not move before the pictures are returned.
+
+        Returns:
+            What waits for them, and returns what `look` does.
+
+        Raises:
+            SimulationError: If this process is a fork of one that drew.
+        """
+        finish = self._simulation.begin_look(
+            env, self._cameras, self._textures, markers=self._markers
+        )
+        return lambda: dict(zip(self._cameras, finish(), strict=True))
 
 
 class Cameras:
@@ -55,10 +108,9 @@ class Cameras:
             SimulationError: If the worlds have no visuals, or ``eye`` and ``target`` coincide.
             UnknownNameError: If it rides on a robot, or a link of it, that is not there.
         """
-        _expect_visuals(simulation)
+        view = camera or Camera(eye, target, "view", SIZE, SIZE, FIELD_OF_VIEW)
         self._simulation = simulation
-        self._view = camera or Camera(eye, target, "view", SIZE, SIZE, FIELD_OF_VIEW)
-        _expect_mounts(simulation, [self._view])
+        self._looking = Observers(simulation, {"view": view}, ("rgb",), markers=True)
 
     def take(self) -> NDArray[np.uint8]:
         """Return what every camera sees now, (N, H, W, 3).
@@ -66,67 +118,8 @@ class Cameras:
         Raises:
             SimulationError: If this process is a fork of one that drew.
         """
-        pictures: list[Texture] = []
-        for env in range(self._simulation.num_envs):
-            (view,) = self._simulation.look(env, {"view": self._view}, ("rgb",), markers=True)
-            pictures.append(view.images["rgb"])
-        return np.stack(pictures).astype(np.uint8, copy=False)
-
-
-class Observers:
-    """The cameras that observe: in every world the same ones, which do not see its markers."""
-
-    def __init__(
-        self,
-        simulation: Simulation,
-        cameras: Mapping[str, AnyCamera],
-        textures: Sequence[str],
-    ) -> None:
-        """Remember what to look with; cameras are set up when a world is first looked at.
-
-        Args:
-            simulation: Worlds that were built with visuals.
-            cameras: Camera by its name in observations.
-            textures: What to take, some of `robot_layouts.simulation.scene.cameras.TEXTURES`.
-
-        Raises:
-            SimulationError: If the worlds have no visuals.
-            UnknownNameError: If a camera rides on a robot, or a link of it, that is not there.
-        """
-        _expect_visuals(simulation)
-        self._simulation, self._cameras, self._textures = simulation, dict(cameras), tuple(textures)
-        _expect_mounts(simulation, self._cameras.values())
-
-    def look(self, env: int) -> dict[str, View]:
-        """Return what every camera sees in one world now, by its name.
-
-        Raises:
-            SimulationError: If this process is a fork of one that drew.
-        """
-        return self.begin(env)()
-
-    def begin(self, env: int) -> Callable[[], dict[str, View]]:
-        """Begin to draw one world, which may not move before the pictures are returned.
-
-        Returns:
-            What waits for them, and returns what `look` does.
-
-        Raises:
-            SimulationError: If this process is a fork of one that drew.
-        """
-        finish = self._simulation.begin_look(env, self._cameras, self._textures, markers=False)
-        return lambda: dict(zip(self._cameras, finish(), strict=True))
-
-
-def _expect_mounts(simulation: Simulation, cameras: Iterable[AnyCamera]) -> None:
-    for on in filter(None, map(ridden, cameras)):
-        simulation.index.robots[on[0]]
-        simulation.index.links[on[0]].expect(on[1])
-
-
-def _expect_visuals(simulation: Simulation) -> None:
-    if not all(world.visuals for world in simulation.worlds):
-        raise SimulationError("these worlds have nothing to draw; build them with visuals=True")
+        views = [self._looking.look(env)["view"] for env in range(self._simulation.num_envs)]
+        return np.stack([view.images["rgb"] for view in views]).astype(np.uint8, copy=False)
 
 
 def drawing_problem(simulator: str) -> str | None:

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.simulation.backend import Backend, Rows, open_backend
+from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.control.modes import ModeController
 from robot_layouts.simulation.maths import Array, Floats
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings, substeps
 from robot_layouts.simulation.readout import Moment, ReadoutIndex
-from robot_layouts.simulation.scene.cameras import AnyCamera, View
-from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.state import State
+from robot_layouts.simulation.variation import Variation
 from robot_layouts.simulation.world import Placements, Visuals, World
 from robots import RobotDescriptor, SimulationError
 from robots.descriptor import IDENTITY, Quaternion
@@ -88,7 +88,7 @@ class Simulation:
             self.modes = ModeController(layout, self._controller)
         self.worlds: list[World] = []
         self._fresh = set(self._everywhere)  # worlds that have not moved since their reset
-        self._build(self._everywhere, build)
+        self.rebuild(self._everywhere, build)
 
     def rebuild(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
         """Build some worlds anew; what PhysX remembered of their past is gone.
@@ -98,7 +98,16 @@ class Simulation:
             build: As when the simulation was made. It is not kept from then: a task's own would
                 keep the task, and with it these worlds, until Python looks for circles.
         """
-        self._build(env_ids, build)
+        fresh = {i: self._describe(i, build) for i in env_ids}
+        self._placements.forget(env_ids)
+        _expect_alike({**dict(enumerate(self.worlds)), **fresh})
+        built = self.backend.build(fresh)
+        self.worlds = [fresh.get(i) or self.worlds[i] for i in self._everywhere]
+        self.index = ReadoutIndex(self.layout, built)
+        self._fresh.update(env_ids)
+        if self.modes is not None:
+            self.modes.build(self.backend, self.index)
+        self._change()
 
     def descriptor(self, robot: str) -> RobotDescriptor:
         """Return what the robot of that name is."""
@@ -295,18 +304,6 @@ class Simulation:
         )
         build(world, index)
         return world
-
-    def _build(self, env_ids: Sequence[int], build: Callable[[World, int], None]) -> None:
-        fresh = {i: self._describe(i, build) for i in env_ids}
-        self._placements.forget(env_ids)
-        _expect_alike({**dict(enumerate(self.worlds)), **fresh})
-        built = self.backend.build(fresh)
-        self.worlds = [fresh.get(i) or self.worlds[i] for i in self._everywhere]
-        self.index = ReadoutIndex(self.layout, built)
-        self._fresh.update(env_ids)
-        if self.modes is not None:
-            self.modes.build(self.backend, self.index)
-        self._change()
 
 
 def _expect_alike(worlds: Mapping[int, World]) -> None:

@@ -24,6 +24,7 @@ from layouts.frames import Pose
 from robot_layouts.kinematics.chain import Chain, Search
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of
 from robot_layouts.kinematics.solve import by_way, descend_by_differences, nearby, turned_within
+from robot_layouts.kinematics.tree import Tree
 from robots import DescriptorError, RobotDescriptor, SimulationError, UnknownNameError
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
@@ -224,7 +225,7 @@ class TreeArm:
         """
         placement = layout[layout.owner(robot)]
         self.descriptor = descriptor = layout.arm(robot).robot
-        whole, tree = placement.robot.joints, _tree(placement.robot)
+        whole, tree = placement.robot.joints, tree_of(placement.robot)
         self.joints = descriptor.arm_joints
         self.places = np.array([descriptor.joints.index(joint) for joint in self.joints], np.intp)
         self._owned = np.array([whole.index(joint) for joint in descriptor.joints], np.intp)
@@ -287,7 +288,7 @@ class TreeFollower:
             DescriptorError: If the joints do not move the link.
             AssetError: If the robot's files cannot be found or read.
         """
-        tree = _tree(robot)
+        tree = tree_of(robot)
         root = 0 if root_link is None else link_index(tree, root_link)
         end = link_index(tree, link)
         if root not in tree.path(end):
@@ -305,6 +306,7 @@ class TreeFollower:
         return found[0, self._free] if arrived[0] else None
 
 
-def _tree(robot: RobotDescriptor) -> Any:
+def tree_of(robot: RobotDescriptor) -> Tree:
+    """Return the links of a robot, whose coordinates are its joints."""
     urdf = robot.urdf.locate()
     return kinematic_tree(read_model(read_urdf(urdf), urdf.as_posix()), robot.joints)

@@ -22,7 +22,6 @@ from robot_layouts.simulation.maths import (
     full,
     like,
     norm,
-    number,
     stack,
 )
 from robot_layouts.simulation.readout import Lost, MeanFrame, Moment, ReadoutIndex
@@ -301,9 +300,9 @@ class State:
         """How far a robot's gripper is open, shape (N,): 0 closed, 1 wide open, 1 without one."""
         gripper = self._index.grippers[robot]
         if gripper is None:
-            return np.ones(self.num_envs, np.float32)
+            return self.full(1.0)
         joints, widest = gripper
-        return np.add.reduce(self.joint_positions[:, joints], 1) / widest
+        return self.joint_positions[:, joints].sum(1) / widest
 
     @remembered
     def arm_speed(self, robot: str) -> Floats:
@@ -313,8 +312,8 @@ class State:
     @remembered
     def is_static(self, robot: str, threshold: float = 0.2) -> Flags:
         """Whether no arm joint is faster than ``threshold`` (rad/s), shape (N,) bool."""
-        speeds = np.abs(self.joint_velocities[:, self._index.arm_joints[robot]])
-        return np.maximum.reduce(speeds, 1) <= number(threshold)
+        slow: Any = abs(self.joint_velocities[:, self._index.arm_joints[robot]]) <= threshold
+        return slow.all(1)
 
     # -- contacts ----------------------------------------------------------------------------
 

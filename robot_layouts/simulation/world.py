@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,23 @@ from robot_layouts.core.bounds import checked_choice, expect_unit, shown
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from robots import SimulationError, UnknownNameError
 from robots.descriptor import IDENTITY, Quaternion, Vector3
+
+
+class Part(NamedTuple):
+    """A link of a robot, or a body of its own.
+
+    Attributes:
+        robot: The robot's name in the layout, or None.
+        name: Name of the link or the body.
+    """
+
+    robot: str | None
+    name: str
+
+    def __str__(self) -> str:
+        """Return ``robot.link``, or the body's name."""
+        return self.name if self.robot is None else f"{self.robot}.{self.name}"
+
 
 BodyKind = Literal["dynamic", "kinematic", "static"]
 _KINDS = get_args(BodyKind)

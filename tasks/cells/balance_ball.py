@@ -46,7 +46,6 @@ class CellBalanceBall(CellTask):
     the ball is on it, and it moves no more.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Carry the board over the mark without losing the ball.",
         "Lift the board together, keep it level, and bring the ball over the mark.",

@@ -34,7 +34,6 @@ class CellBuildBridge(CellTask):
     Success: both pillars stand on their marks, the beam rests on them, and all is let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Build the bridge: two pillars, then the beam across.",
         "Set the pillars on their marks and lay the beam on them.",

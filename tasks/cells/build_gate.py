@@ -43,7 +43,6 @@ class CellBuildGate(CellTask):
     Success: every part rests in its place, to within 2.5 cm, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Build the gate: two pillars, a beam across them, and a cap on top.",
         "Set up both pillars, then lay the beam on them and the cap on the beam.",

@@ -38,7 +38,6 @@ class CellCarryBeam(CellTask):
     Success: the cube lies on the mark, the beam on both rests, within 3 cm, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Clear the rests, then lay the beam on both.",
         "Put the cube on the mark and carry the beam onto the two rests.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi
 
 from layouts import Layout, Placement
-from tasks import BLUE, RED, Area, CellTask, Cube, Needs, State, Target, is_at_rest, register_task
+from tasks import BLUE, RED, Area, CellTask, Cube, Needs, State, Target, register_task
 from tasks.maths import Array, Floats
 
 HALF, RADIUS = 0.02, 0.05  # of cubes and marks (m)
@@ -29,7 +29,6 @@ class CellCrossOver(CellTask):
     Success: every cube rests within 5 cm of its mark, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Cross over: bring each cube to the mark before your neighbour.",
         "Neighbours exchange sides: your cube belongs on the mark before the arm beside you.",
@@ -59,16 +58,8 @@ class CellCrossOver(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: every cube is across, at rest and let go."""
-        held = [state.is_grasping(arm, f"cube_{arm}") for arm in self.arms]
-        rest = [is_at_rest(state, f"cube_{arm}") for arm in self.arms]
-        near = [way <= RADIUS for way in self.ways(state)]
-        count = self.count([n & r & ~h for n, r, h in zip(near, rest, held, strict=True)])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_across": count >= 1,
-            "are_three_across": count >= 3,
-            "success": count >= 4,
-        }
+        held, count = self.held_and_left(state, {a: f"cube_{a}" for a in self.arms}, RADIUS)
+        return {"is_one_held": held >= 1, **self.passed(count, 1, 3, 4)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their marks."""

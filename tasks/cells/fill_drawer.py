@@ -23,7 +23,6 @@ class CellFillDrawer(CellTask):
     Success: the cube is in the drawer, let go, and the drawer is shut to 1.5 cm.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Open the drawer, put the cube into it, and shut it.",
         "One pulls the drawer open, one lays the cube in, one pushes it shut.",

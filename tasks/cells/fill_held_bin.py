@@ -54,7 +54,6 @@ class CellFillHeldBin(CellTask):
     Success: both cubes are in the bin, let go, while the holder holds it 8 cm high, level to 15°.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the bin up by its handle and drop both cubes into it.",
         "One lifts the bin and holds it, two put a cube each into it.",

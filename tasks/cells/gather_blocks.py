@@ -33,7 +33,6 @@ class CellGatherBlocks(CellTask):
     Success: all four are within 20 cm of the middle and at rest.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Push all blocks onto the mark in the middle.",
         "Gather the four blocks on the mark.",

@@ -54,7 +54,6 @@ class CellHammerPegs(CellTask):
     Success: all pegs are driven by 2.5 cm, and the mallet stands on the mark, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Drive all three pegs home with the mallet, and put it on the mark.",
         "Pass the mallet on over the mark: each drive your peg home with it.",

@@ -35,7 +35,6 @@ class CellHandMugOn(CellTask):
     and the trivet lies within 7 cm of the mark.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hand the mug on and stand it on the trivet, which is pushed onto the mark.",
         "One brings the mug to the spot, one stands it on the trivet, which the third pushes near.",

@@ -19,7 +19,6 @@ from tasks import (
     Needs,
     State,
     World,
-    is_at_rest,
     register_task,
 )
 from tasks.maths import Array, Floats, norm
@@ -59,7 +58,6 @@ class CellHangBrackets(CellTask):
     Success: all three rest on the pegs, one on the other, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hang the red bracket on the pegs, the blue one back to back with it, and the bar on both.",
         "Assemble the three parts on the two pegs: red first, then blue, the green bar last.",
@@ -87,15 +85,8 @@ class CellHangBrackets(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: each part on its seat, at rest and let go."""
-        held = [state.is_grasping(arm, part) for arm, part in PARTS.items()]
-        parts = zip(PARTS.values(), self.ways(state), held, strict=True)
-        on = self.count([(way <= ON) & is_at_rest(state, part) & ~h for part, way, h in parts])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_on": on >= 1,
-            "are_two_on": on >= 2,
-            "success": on >= 3,
-        }
+        held, on = self.held_and_left(state, PARTS, ON)
+        return {"is_one_held": held >= 1, **self.passed(on, 1, 2, 3)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the parts to their seats."""

@@ -33,7 +33,6 @@ class CellHoldAndPush(CellTask):
     Success: the cap is pressed by 5 mm, and both blocks rest within 6 cm of their marks.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Keep the button pressed while the others push their blocks onto the marks.",
         "Hold the button down until both blocks lie on their marks.",

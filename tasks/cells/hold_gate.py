@@ -38,7 +38,6 @@ class CellHoldGate(CellTask):
     to 6°.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the gate open, hand the bar through, and lay it on the mark behind.",
         "One opens the gate and holds it while one hands the bar through it to another.",

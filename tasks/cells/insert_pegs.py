@@ -62,7 +62,6 @@ class CellInsertPegs(CellTask):
     level to 15°.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the yoke up and insert a peg into each of its sockets.",
         "One lifts the grey yoke and holds it, two put their pegs into it.",
@@ -92,12 +91,10 @@ class CellInsertPegs(CellTask):
         level = state.rotation("yoke")[:, 2, 2] >= cos(LEVEL)
         up = held & level & (state.position("yoke")[:, 2] >= HEIGHT)
         inside = self.count(
-            [
-                self.is_left_in(
-                    state, arm, f"peg_{arm}", "yoke", (-NEAR, y - NEAR, 0), (NEAR, y + NEAR, IN)
-                )
-                for arm, y in SIDES.items()
-            ]
+            self.is_left_in(
+                state, arm, f"peg_{arm}", "yoke", (-NEAR, y - NEAR, 0), (NEAR, y + NEAR, IN)
+            )
+            for arm, y in SIDES.items()
         )
         return {
             "is_held": held,

@@ -38,7 +38,6 @@ class CellLiftBoard(CellTask):
     Success: it is 15 cm high and level to 5°, all four arms hold it, and it moves no more.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Lift the board together and hold it level.",
         "Each take the tab before you, then raise the board.",

@@ -15,9 +15,8 @@ from tasks import (
     State,
     World,
     register_task,
-    transform,
 )
-from tasks.maths import Array, Floats, maximum, norm
+from tasks.maths import Array, Floats, maximum
 
 HEIGHT, LEVEL, IN = 0.15, radians(8), 0.12  # m, rad, m
 TURN = radians(15)
@@ -34,7 +33,6 @@ class CellLiftPot(CellTask):
     ball is in it.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Lift the pot by its two handles.",
         "Raise the pot together and keep it level.",
@@ -72,11 +70,5 @@ class CellLiftPot(CellTask):
         """Of both hands to their handles, and of the pot upwards."""
         above = maximum(HEIGHT - state.position("pot")[:, 2], 0.0)
         points = self.pot.descriptor.points
-        handles = {arm: state.array((points[f"{arm}_handle"].position,)) for arm in self.arms}
-        return [
-            *(
-                norm(transform(state.pose("pot"), point) - state.tcp_position(arm))
-                for arm, point in handles.items()
-            ),
-            above,
-        ]
+        handles = {arm: points[f"{arm}_handle"].position for arm in self.arms}
+        return [*(self.tip_distance(state, a, "pot", at) for a, at in handles.items()), above]

@@ -24,7 +24,6 @@ class CellLoadTray(CellTask):
     let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the tray up and lay the cube on it.",
         "Two raise the tray, the third puts the cube on it.",

@@ -12,7 +12,6 @@ from tasks import (
     Object,
     State,
     World,
-    is_at_rest,
     register_task,
 )
 from tasks.maths import Array, Floats, norm
@@ -31,7 +30,6 @@ class CellMountGears(CellTask):
     Success: every gear rests on the seat of its shaft, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Put every gear on the shaft to the right of its arm.",
         "Mount the three gears on the three shafts, each arm to its right.",
@@ -60,16 +58,8 @@ class CellMountGears(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: every gear on its shaft, at rest and let go."""
-        held = [state.is_grasping(arm, f"gear_{arm}") for arm in self.arms]
-        rest = [is_at_rest(state, f"gear_{arm}") for arm in self.arms]
-        ways = zip(self.ways(state), rest, held, strict=True)
-        on = self.count([(way <= ON) & r & ~h for way, r, h in ways])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_on": on >= 1,
-            "are_two_on": on >= 2,
-            "success": on >= 3,
-        }
+        held, on = self.held_and_left(state, {a: f"gear_{a}" for a in self.arms}, ON)
+        return {"is_one_held": held >= 1, **self.passed(on, 1, 2, 3)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the gears to their seats."""

@@ -37,7 +37,6 @@ class CellMovePot(CellTask):
     Success: the pot stands within 3 cm of the mark, let go, the ball in it, the block on the other.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Push the block off the mark and move the pot there, without spilling the ball.",
         "Make room, then carry the pot onto the mark by its two handles.",

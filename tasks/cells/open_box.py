@@ -19,9 +19,8 @@ from tasks import (
     State,
     World,
     register_task,
-    transform,
 )
-from tasks.maths import Array, Floats, norm
+from tasks.maths import Array, Floats
 
 HALF, OPENED, SHUT = 0.02, 1.0, 0.1  # of cubes (m), and of the lid: from here and up to here (rad)
 LONG, STEEP = 0.11, 0.9  # of the lever (m), and how steep it is while the lid is shut (rad)
@@ -57,7 +56,6 @@ class CellOpenBox(CellTask):
     Success: both cubes are in the box, let go, and its lid is shut to 0.1 rad.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the box open by its lever, put both cubes into it, and let it fall shut.",
         "One presses the lever that lifts the lid, two put a cube each into the box.",
@@ -96,6 +94,6 @@ class CellOpenBox(CellTask):
     def ways(self, state: State) -> list[Floats]:
         """Of the opener's tip to the lever, and of the cubes to the box."""
         x, _, z = self.box.descriptor.joints[0].at
-        end = state.array(((x - LONG * cos(STEEP), 0.0, z + LONG * sin(STEEP)),))
-        tip = norm(transform(state.pose("box.lid"), end) - state.tcp_position("opener"))
+        end = (x - LONG * cos(STEEP), 0.0, z + LONG * sin(STEEP))
+        tip = self.tip_distance(state, "opener", "box.lid", end)
         return [tip, *(state.planar_distance(f"cube_{arm}", "box") for arm in PACKERS)]

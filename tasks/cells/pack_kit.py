@@ -58,7 +58,6 @@ class CellPackKit(CellTask):
     Success: all four parts stand in the pockets of their colours, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Put every part into the pocket of its colour.",
         "Fill the kit: red block, green rod, blue stair and white cross, each where its colour is.",
@@ -93,17 +92,10 @@ class CellPackKit(CellTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all are in their pockets, let go."""
         done = self.count(
-            [
-                self.is_left_in(state, arm, part, f"pocket_{arm}", LOW, HIGH)
-                for arm, part in PARTS.items()
-            ]
+            self.is_left_in(state, arm, part, f"pocket_{arm}", LOW, HIGH)
+            for arm, part in PARTS.items()
         )
-        return {
-            "is_one_in": done >= 1,
-            "are_two_in": done >= 2,
-            "are_three_in": done >= 3,
-            "success": done >= 4,
-        }
+        return self.passed(done, 1, 2, 3, 4)
 
     def ways(self, state: State) -> list[Floats]:
         """Of the parts to their pockets."""

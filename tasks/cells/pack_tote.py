@@ -35,7 +35,6 @@ class CellPackTote(CellTask):
     Success: all four are in the tote, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Pack the can, the block, the ball and the cube into the tote.",
         "Put everything into the tote.",
@@ -68,12 +67,7 @@ class CellPackTote(CellTask):
         done = self.count(
             [self.is_left_in(state, arm, part, "tote", LOW, HIGH) for arm, part in PARTS.items()]
         )
-        return {
-            "is_one_in": done >= 1,
-            "are_two_in": done >= 2,
-            "are_three_in": done >= 3,
-            "success": done >= 4,
-        }
+        return self.passed(done, 1, 2, 3, 4)
 
     def ways(self, state: State) -> list[Floats]:
         """Of the things to the tote."""

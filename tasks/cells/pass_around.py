@@ -32,7 +32,6 @@ class CellPassAround(CellTask):
     Success: the last arm holds the cube 10 cm above the table.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hand the cube on around the ring; the last one holds it up.",
         "Pass the cube from arm to arm, and let the last lift it.",

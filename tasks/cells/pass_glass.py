@@ -38,7 +38,6 @@ class CellPassGlass(CellTask):
     it, and the bell is pressed by 5 mm.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Pass the full cup on to the mark without losing a ball, then ring.",
         "One brings the cup to the spot, one stands it on the mark, one rings; spill nothing.",

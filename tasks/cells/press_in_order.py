@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from layouts import ring
-from tasks import CellTask, EpisodeRandom, Object, State, World, register_task, transform
-from tasks.maths import Array, Floats, floats, norm, where
+from tasks import CellTask, EpisodeRandom, Object, State, World, register_task
+from tasks.maths import Array, Floats, floats, where
 
 MAKES = ("ur10", "panda_stick", "xarm7")
 ARMS = tuple("south southeast east northeast north northwest west southwest".split())
@@ -36,7 +36,6 @@ class CellPressInOrder(CellTask):
     Success: all caps were pressed by 5 mm, one after the other, and none before its turn.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = tuple(
         words.format(arm, WAYS[number % 2]) for words in PHRASES for number, arm in enumerate(ARMS)
     )
@@ -71,9 +70,9 @@ class CellPressInOrder(CellTask):
 
     def ways(self, state: State) -> list[Floats]:
         """Of the tips to the caps that are still to be pressed."""
-        top = state.array((self.button_south.descriptor.points["top"].position,))
+        top = self.button_south.descriptor.points["top"].position
         return [
-            norm(transform(state.pose(f"button_{arm}"), top) - state.tcp_position(arm))
+            self.tip_distance(state, arm, f"button_{arm}", top)
             * floats(turn >= self.memory.pressed)
             for arm, turn in zip(self.arms, self._turns(state), strict=True)
         ]

@@ -37,7 +37,6 @@ class CellPushBar(CellTask):
     Success: both ends of the bar are within 2 cm of the line, and it is at rest.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Push the bar onto the line.",
         "Together push the long bar until it lies on the green line.",

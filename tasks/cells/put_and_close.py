@@ -21,7 +21,6 @@ class CellPutAndClose(CellTask):
     Success: the cube is in the drawer, let go, and the drawer is shut to 1.5 cm.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Put the cube into the drawer and close it.",
         "Lay the cube in the drawer, then push the drawer shut.",

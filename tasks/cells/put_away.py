@@ -22,7 +22,6 @@ class CellPutAway(CellTask):
     Success: the drawer is open by 12 cm, and the can rests in it, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Open the drawer and put the can into it.",
         "Put the can away in the drawer.",

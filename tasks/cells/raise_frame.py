@@ -38,7 +38,6 @@ class CellRaiseFrame(CellTask):
     Success: it is 12 cm high and level to 5°, all arms hold it, and it moves no more.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Lift the frame together and hold it level.",
         "Each take the tab before you, then raise the frame in step.",

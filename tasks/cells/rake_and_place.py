@@ -46,7 +46,6 @@ class CellRakeAndPlace(CellTask):
     Success: both blocks are in their boxes, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Pull the blocks near with the rake and put each into the box of its side.",
         "One rakes the two far blocks in, the others put them into their boxes.",
@@ -76,12 +75,8 @@ class CellRakeAndPlace(CellTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: both are in, let go."""
         near = [state.position(f"block_{arm}")[:, 1] <= NEAR for arm in PLACERS]
-        held = [state.is_grasping(arm, f"block_{arm}") for arm in PLACERS]
         inside = self.count(
-            [
-                self.is_within(state, f"block_{arm}", f"box_{arm}", LOW, HIGH) & ~holds
-                for arm, holds in zip(PLACERS, held, strict=True)
-            ]
+            self.is_left_in(state, arm, f"block_{arm}", f"box_{arm}", LOW, HIGH) for arm in PLACERS
         )
         return {
             "is_rake_held": state.is_grasping("puller", "rake"),

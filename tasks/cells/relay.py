@@ -34,7 +34,6 @@ class CellRelay(CellTask):
     Success: the block is in the box, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Push the block onto the first mark, then onto the second, and pack it into the box.",
         "Relay the block: the first pushes it to the corner, the second on, the third packs it.",

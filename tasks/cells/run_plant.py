@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import pi
 
 from layouts import ring
-from tasks import CellTask, EpisodeRandom, Object, State, World, register_task, transform
-from tasks.maths import Array, Floats, maximum, norm
+from tasks import CellTask, EpisodeRandom, Object, State, World, register_task
+from tasks.maths import Array, Floats, maximum
 
 # By arm: what it works, its joint, from where on that is on (m or rad), and where it is worked
 WORKS = {
@@ -30,7 +30,6 @@ class CellRunPlant(CellTask):
     the slider up by 12 cm.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Run the plant: hold the button, throw the lever, open the tap, push the slider up.",
         "Keep the button down, and switch on lever, tap and slider.",
@@ -59,12 +58,8 @@ class CellRunPlant(CellTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all are on."""
         on = self.count([left <= 0.0 for left in self._left(state)])
-        return {
-            "is_one_near": self.count([tip <= NEAR for tip in self._tips(state)]) >= 1,
-            "is_one_on": on >= 1,
-            "are_three_on": on >= 3,
-            "success": on >= 4,
-        }
+        near = self.count([tip <= NEAR for tip in self._tips(state)])
+        return {"is_one_near": near >= 1, **self.passed(on, 1, 3, 4)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the tips to the controls, and of these until they are on, 0.2 where all is left."""
@@ -79,9 +74,6 @@ class CellRunPlant(CellTask):
 
     def _tips(self, state: State) -> list[Floats]:
         return [
-            norm(
-                transform(state.pose(f"{body}.{joint}"), state.array((point,)))
-                - state.tcp_position(arm)
-            )
+            self.tip_distance(state, arm, f"{body}.{joint}", point)
             for arm, (body, joint, _, point) in WORKS.items()
         ]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import pi
 
 from layouts import Layout, Placement
-from tasks import Area, CellTask, Needs, Object, State, Target, is_at_rest, register_task, transform
-from tasks.maths import Array, Floats, norm
+from tasks import Area, CellTask, Needs, Object, State, Target, is_at_rest, register_task
+from tasks.maths import Array, Floats
 
 RADIUS, PRESSED = 0.06, 0.005  # of the marks, and how far the bell's cap goes in (m)
 
@@ -21,7 +21,6 @@ class CellServe(CellTask):
     Success: the can rests on its place, let go, while the bell is pressed by 5 mm.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Bring the can to the hatch, serve it, and ring the bell.",
         "Hand the can on until it stands on its place, then ring.",
@@ -58,6 +57,5 @@ class CellServe(CellTask):
 
     def ways(self, state: State) -> list[Floats]:
         """Of the can to its place, of the server's hand to it, and of the stick to the bell."""
-        top = transform(state.pose("bell"), state.array((0.0, 0.0, 0.052))[None])
-        tip = norm(top - state.tcp_position("ringer"))
+        tip = self.tip_distance(state, "ringer", "bell", (0.0, 0.0, 0.052))
         return [state.planar_distance("can", "place"), state.tcp_distance("server", "can"), tip]

@@ -6,8 +6,8 @@ from math import pi
 from typing import Any
 
 from layouts import ring
-from tasks import CellTask, EpisodeRandom, Object, State, World, register_task, transform
-from tasks.maths import Array, Floats, norm
+from tasks import CellTask, EpisodeRandom, Object, State, World, register_task
+from tasks.maths import Array, Floats
 
 PHRASES = (
     "Set the first fader to {}, the second to {} and the third to {}.",
@@ -29,16 +29,15 @@ class CellSetFaders(CellTask):
     Success: all are within 1.2 cm of their numbers, and at rest.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = tuple(words.format(*setting) for words in PHRASES for setting in SETTINGS)
     layout = ring({"first": "xarm7", "second": "panda_stick", "third": "panda"}, radius=0.8)
     max_episode_steps = 150
     stages = {"is_one_near": 0.2, "is_one_set": 0.5, "are_two_set": 0.75, "success": 1.0}
     viewpoint = ((1.2, 0.9, 0.9), (0.0, 0.0, 0.0))
 
-    fader_first = Object("slider", kind="kinematic", joints={"cap": (0.0, 0.02)})
-    fader_second = Object("slider", kind="kinematic", joints={"cap": (0.0, 0.02)})
-    fader_third = Object("slider", kind="kinematic", joints={"cap": (0.0, 0.02)})
+    fader_first = fader_second = fader_third = Object(
+        "slider", kind="kinematic", joints={"cap": (0.0, 0.02)}
+    )
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the faders across the ways to their arms."""
@@ -52,12 +51,8 @@ class CellSetFaders(CellTask):
         still = [abs(state.joint_velocity(f"fader_{arm}", "cap")) <= SLOW for arm in self.arms]
         near = [off <= NEAR for off in self._off(state)]
         done = self.count([n & s for n, s in zip(near, still, strict=True)])
-        return {
-            "is_one_near": self.count([way <= 0.1 for way in self._tips(state)]) >= 1,
-            "is_one_set": done >= 1,
-            "are_two_set": done >= 2,
-            "success": done >= 3,
-        }
+        tips = self.count([way <= 0.1 for way in self._tips(state)])
+        return {"is_one_near": tips >= 1, **self.passed(done, 1, 2, 3)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the tips to the faders, and of these to their numbers."""
@@ -70,6 +65,5 @@ class CellSetFaders(CellTask):
         return off
 
     def _tips(self, state: State) -> list[Floats]:
-        cap = state.array((self.fader_first.descriptor.points["cap"].position,))
-        caps = [transform(state.pose(f"fader_{arm}.cap"), cap) for arm in self.arms]
-        return [norm(c - state.tcp_position(a)) for a, c in zip(self.arms, caps, strict=True)]
+        cap = self.fader_first.descriptor.points["cap"].position
+        return [self.tip_distance(state, arm, f"fader_{arm}.cap", cap) for arm in self.arms]

@@ -18,7 +18,6 @@ from tasks import (
     State,
     World,
     add_target,
-    is_at_rest,
     register_task,
 )
 from tasks.maths import Array, Floats
@@ -38,7 +37,6 @@ class CellShiftRing(CellTask):
     Success: every cube rests in the zone after its own, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Pass on all cubes at once, each to the next zone.",
         "Everybody bring the cube on your left to the zone on your right.",
@@ -72,16 +70,9 @@ class CellShiftRing(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: every cube rests in its arm's zone, let go."""
-        held = [state.is_grasping(arm, f"cube_{arm}") for arm in self.arms]
-        rests = [is_at_rest(state, f"cube_{arm}") for arm in self.arms]
-        near = [way <= RADIUS for way in self.ways(state)]
-        done = self.count([n & r & ~h for n, r, h in zip(near, rests, held, strict=True)])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_there": done >= 1,
-            "are_half_there": done >= len(self.arms) / 2,
-            "success": done >= len(self.arms),
-        }
+        held, done = self.held_and_left(state, {a: f"cube_{a}" for a in self.arms}, RADIUS)
+        every = len(self.arms)
+        return {"is_one_held": held >= 1, **self.passed(done, 1, every / 2, every)}
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:
         """TCPs, the cubes, and their ways to their zones."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import pi
 
 from layouts import ring
-from tasks import CellTask, EpisodeRandom, Object, State, World, register_task, transform
-from tasks.maths import Array, Floats, norm
+from tasks import CellTask, EpisodeRandom, Object, State, World, register_task
+from tasks.maths import Array, Floats
 
 OPEN = (1.66, 1.85)  # of the lid when an episode begins (rad); it leans back
 TRAVEL = 0.044  # of a latch that is pulled out (m)
@@ -25,7 +25,6 @@ class CellShutSuitcase(CellTask):
     Success: the lid is shut to 0.05 rad, and both latches are home to 6 mm.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Shut the suitcase and push both its latches home.",
         "Close the lid, then latch it on both sides.",
@@ -60,11 +59,7 @@ class CellShutSuitcase(CellTask):
 
     def ways(self, state: State) -> list[Floats]:
         """Of the tips to the latches, and of lid and latches, 0.2 where they begin."""
-        tips = [
-            norm(
-                transform(state.pose(f"case.{part}"), state.array((at,))) - state.tcp_position(arm)
-            )
-            for arm, (part, at) in TABS.items()
-        ]
+        tabs = TABS.items()
+        tips = [self.tip_distance(state, arm, f"case.{part}", at) for arm, (part, at) in tabs]
         latches = [0.2 * state.joint("case", side) / TRAVEL for side, _ in TABS.values()]
         return [*tips, 0.2 * state.joint("case", "lid") / OPEN[1], *latches]

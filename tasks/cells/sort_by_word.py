@@ -18,7 +18,6 @@ from tasks import (
     Needs,
     State,
     World,
-    is_at_rest,
     register_task,
 )
 from tasks.maths import Array, Floats
@@ -43,7 +42,6 @@ class CellSortByWord(CellTask):
     Success: every cube rests on its pad, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = tuple(words.format(*choice) for words in PHRASES for choice in CHOICES)
     layout = ring({"red": "panda_wristcam", "green": "franka_panda", "blue": "panda"}, radius=0.75)
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}
@@ -66,19 +64,8 @@ class CellSortByWord(CellTask):
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: every cube on its pad, at rest and let go."""
-        done = self.count(
-            [
-                (way <= PAD)
-                & is_at_rest(state, f"cube_{arm}")
-                & ~state.is_grasping(arm, f"cube_{arm}")
-                for arm, way in zip(self.arms, self.ways(state), strict=True)
-            ]
-        )
-        return {
-            "is_one_there": done >= 1,
-            "are_two_there": done >= 2,
-            "success": done >= 3,
-        }
+        _, done = self.held_and_left(state, {arm: f"cube_{arm}" for arm in self.arms}, PAD)
+        return self.passed(done, 1, 2, 3)
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their pads."""

@@ -36,7 +36,6 @@ class CellSortCubes(CellTask):
     Success: every cube rests on the pad of its colour, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Sort the cubes by colour.",
         "Put every cube on the pad of its colour.",
@@ -72,12 +71,7 @@ class CellSortCubes(CellTask):
         held = [state.is_grasping(arm, f"{arm}_{color}") for arm, color in CUBES]
         lies = [self._lies(state, f"{arm}_{color}", f"pad_{color}") for arm, color in CUBES]
         done = self.count([lie & ~hold for lie, hold in zip(lies, held, strict=True)])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_sorted": done >= 1,
-            "are_three_sorted": done >= 3,
-            "success": done >= 6,
-        }
+        return {"is_one_held": self.count(held) >= 1, **self.passed(done, 1, 3, 6)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their pads."""

@@ -35,7 +35,6 @@ class CellSqueezeBox(CellTask):
     17 cm from its middle.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Lift the box from both sides, push the plinth beneath it, and set it down.",
         "Squeeze the box between you and raise it until the plinth is under it, then lower it.",

@@ -43,7 +43,6 @@ class CellStackInOrder(CellTask):
     Success: every cube rests within 2.5 cm of its place in the tower, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = tuple(words.format(*order) for words in PHRASES for order in ORDERS)
     layout = ring({"red": "panda", "green": "panda_wristcam", "blue": "franka_panda"}, radius=0.75)
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}
@@ -67,12 +66,7 @@ class CellStackInOrder(CellTask):
         slow = [state.speed(f"cube_{arm}") <= SLOW for arm in self.arms]
         near = [way <= NEAR for way in self.ways(state)]
         placed = self.count([n & s & ~h for n, s, h in zip(near, slow, held, strict=True)])
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_placed": placed >= 1,
-            "are_two_placed": placed >= 2,
-            "success": placed >= 3,
-        }
+        return {"is_one_held": self.count(held) >= 1, **self.passed(placed, 1, 2, 3)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their places in the tower."""

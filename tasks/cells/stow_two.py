@@ -38,7 +38,6 @@ class CellStowTwo(CellTask):
     pressed by 5 mm.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the button, stow both cubes in the drawer, and shut it.",
         "Keep the button down; open the drawer, put the two cubes into it, and close it again.",
@@ -70,10 +69,7 @@ class CellStowTwo(CellTask):
         """Success: both in it, let go, and it is shut, the button down."""
         drawer, held = state.joint("case", "drawer"), state.joint("button", "cap") >= DOWN
         inside = self.count(
-            [
-                self.is_left_in(state, arm, f"cube_{arm}", "case.drawer", LOW, HIGH)
-                for arm in PACKERS
-            ]
+            self.is_left_in(state, arm, f"cube_{arm}", "case.drawer", LOW, HIGH) for arm in PACKERS
         )
         return {
             "is_open": drawer >= OPENED,

@@ -34,7 +34,6 @@ class CellSwapPlaces(CellTask):
     Success: each cube rests within 5 cm of where the other one began, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = ("Swap the cubes.", "Exchange red and blue.", "Lay each where the other one is.")
     layout = ring({"south": "panda", "east": "franka_panda", "west": "panda_wristcam"}, radius=0.75)
     needs = {"*": Needs(fingers=True, opening=2 * HALF)}

@@ -41,7 +41,6 @@ class CellSweepBlocks(CellTask):
     Success: all six are within 22 cm of the middle and at rest.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Sweep all blocks onto the mark in the middle.",
         "Take the brooms and sweep the blocks together; the others push theirs.",

@@ -37,7 +37,6 @@ class CellTakeSides(CellTask):
     Success: all are within 9 cm of the middles of their marks and at rest.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = tuple(words.format(*sides) for words in PHRASES for sides in SIDES)
     layout = ring(
         {"first": "ur10", "second": "panda_stick", "third": "xarm7", "fourth": "panda"}, radius=0.9

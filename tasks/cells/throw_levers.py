@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import pi
 
 from layouts import ring
-from tasks import CellTask, EpisodeRandom, Object, State, World, register_task, transform
-from tasks.maths import Array, Floats, maximum, norm
+from tasks import CellTask, EpisodeRandom, Object, State, World, register_task
+from tasks.maths import Array, Floats, maximum
 
 PAIRS = (("red", "blue"), ("green", "white"), ("white", "red"), ("blue", "green"))
 ARMS = ("red", "green", "blue", "white")
@@ -30,7 +30,6 @@ class CellThrowLevers(CellTask):
     Success: the two are thrown, and the others as they were.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = tuple(words.format(*pair) for words in PHRASES for pair in PAIRS)
     layout = ring(
         {"red": "ur10", "green": "panda_stick", "blue": "xarm7", "white": "panda"}, radius=0.85
@@ -39,10 +38,7 @@ class CellThrowLevers(CellTask):
     stages = {"is_one_near": 0.2, "is_one_thrown": 0.6, "success": 1.0}
     viewpoint = ((1.2, 1.0, 1.0), (0.0, 0.0, 0.1))
 
-    lever_red = Object("lever", kind="kinematic")
-    lever_green = Object("lever", kind="kinematic")
-    lever_blue = Object("lever", kind="kinematic")
-    lever_white = Object("lever", kind="kinematic")
+    lever_red = lever_green = lever_blue = lever_white = Object("lever", kind="kinematic")
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Stand a lever before each arm."""
@@ -83,6 +79,5 @@ class CellThrowLevers(CellTask):
         ]
 
     def _tips(self, state: State) -> list[Floats]:
-        knob = state.array((self.lever_red.descriptor.points["knob"].position,))
-        knobs = [transform(state.pose(f"lever_{arm}.lever"), knob) for arm in self.arms]
-        return [norm(k - state.tcp_position(a)) for a, k in zip(self.arms, knobs, strict=True)]
+        knob = self.lever_red.descriptor.points["knob"].position
+        return [self.tip_distance(state, arm, f"lever_{arm}.lever", knob) for arm in self.arms]

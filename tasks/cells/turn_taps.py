@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from layouts import ring
-from tasks import CellTask, EpisodeRandom, Object, State, World, register_task, transform
-from tasks.maths import Array, Floats, norm
+from tasks import CellTask, EpisodeRandom, Object, State, World, register_task
+from tasks.maths import Array, Floats
 
 PHRASES = (
     "Open the taps, first to fourth, by {}, {}, {} and {} notches.",
@@ -30,7 +30,6 @@ class CellTurnTaps(CellTask):
     Success: all are within 0.15 rad of their numbers, and at rest.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = tuple(words.format(*setting) for words in PHRASES for setting in SETTINGS)
     layout = ring(
         {"first": "ur10", "second": "panda_stick", "third": "xarm7", "fourth": "panda"},
@@ -40,10 +39,7 @@ class CellTurnTaps(CellTask):
     stages = {"is_one_near": 0.2, "is_one_set": 0.4, "are_three_set": 0.8, "success": 1.0}
     viewpoint = ((1.2, 1.0, 1.0), (0.0, 0.0, 0.1))
 
-    tap_first = Object("tap", kind="kinematic")
-    tap_second = Object("tap", kind="kinematic")
-    tap_third = Object("tap", kind="kinematic")
-    tap_fourth = Object("tap", kind="kinematic")
+    tap_first = tap_second = tap_third = tap_fourth = Object("tap", kind="kinematic")
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Stand a tap before each arm."""
@@ -55,12 +51,8 @@ class CellTurnTaps(CellTask):
         still = [abs(state.joint_velocity(f"tap_{arm}", "handle")) <= SLOW for arm in self.arms]
         near = [off <= NEAR for off in self._off(state)]
         done = self.count([n & s for n, s in zip(near, still, strict=True)])
-        return {
-            "is_one_near": self.count([tip <= 0.1 for tip in self._tips(state)]) >= 1,
-            "is_one_set": done >= 1,
-            "are_three_set": done >= 3,
-            "success": done >= 4,
-        }
+        tips = self.count([tip <= 0.1 for tip in self._tips(state)])
+        return {"is_one_near": tips >= 1, **self.passed(done, 1, 3, 4)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the tips to the handles, and of these to their numbers."""
@@ -73,7 +65,4 @@ class CellTurnTaps(CellTask):
         return off
 
     def _tips(self, state: State) -> list[Floats]:
-        handles = [
-            transform(state.pose(f"tap_{arm}.handle"), state.array((HANDLE,))) for arm in self.arms
-        ]
-        return [norm(h - state.tcp_position(a)) for a, h in zip(self.arms, handles, strict=True)]
+        return [self.tip_distance(state, arm, f"tap_{arm}.handle", HANDLE) for arm in self.arms]

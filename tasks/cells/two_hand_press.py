@@ -16,7 +16,6 @@ from tasks import (
     World,
     is_at_rest,
     register_task,
-    transform,
 )
 from tasks.maths import Array, Floats, norm
 
@@ -37,7 +36,6 @@ class CellTwoHandPress(CellTask):
     middle and the loader's tip is at least 20 cm from it.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Load the press, step back, and start it with both buttons.",
         "Push the block onto the die; once the loader is clear, press both buttons at once.",
@@ -74,9 +72,8 @@ class CellTwoHandPress(CellTask):
     def ways(self, state: State) -> list[Floats]:
         """Of the block to the die, and of the tips to the buttons."""
         points = self.control.descriptor.points
-        tops = [state.array((points[cap].position,)) for cap in SIDES.values()]
         tips = [
-            norm(transform(state.pose("control"), top) - state.tcp_position(arm))
-            for arm, top in zip(SIDES, tops, strict=True)
+            self.tip_distance(state, arm, "control", points[cap].position)
+            for arm, cap in SIDES.items()
         ]
         return [state.planar_distance("block", "die"), *tips]

@@ -59,7 +59,6 @@ class CellUnloadTurntable(CellTask):
     Success: all cubes are in their boxes, let go.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Take the cubes off the turning table and put each into the box of its colour.",
         "Unload the turntable: red, green and blue go into their boxes.",
@@ -92,17 +91,9 @@ class CellUnloadTurntable(CellTask):
         """Success: all are in their boxes, let go."""
         held = [state.is_grasping(arm, f"cube_{arm}") for arm in self.arms]
         done = self.count(
-            [
-                self.is_within(state, f"cube_{arm}", f"box_{arm}", LOW, UP) & ~holds
-                for arm, holds in zip(self.arms, held, strict=True)
-            ]
+            self.is_left_in(state, arm, f"cube_{arm}", f"box_{arm}", LOW, UP) for arm in self.arms
         )
-        return {
-            "is_one_held": self.count(held) >= 1,
-            "is_one_in": done >= 1,
-            "are_two_in": done >= 2,
-            "success": done >= 3,
-        }
+        return {"is_one_held": self.count(held) >= 1, **self.passed(done, 1, 2, 3)}
 
     def ways(self, state: State) -> list[Floats]:
         """Of the cubes to their boxes."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import pi
 
 from layouts import Layout, Placement
-from tasks import Area, CellTask, Object, State, register_task, transform
-from tasks.maths import Array, Floats, maximum, norm
+from tasks import Area, CellTask, Object, State, register_task
+from tasks.maths import Array, Floats, maximum
 
 DRAWN, THROWN, PRESSED = 0.045, 0.6, 0.005  # of bolt, lever and cap: on from here (m, rad, m)
 # By arm, what its tip works, and where in the frame of that (m)
@@ -28,7 +28,6 @@ class CellUnlock(CellTask):
     Success: the button is pressed by 5 mm while the lever is thrown beyond 0.6 rad.
     """
 
-    source = "robot-layouts; geometry and rewards are its own"
     instruction = (
         "Hold the bolt drawn, throw the lever, then press the button.",
         "Unlock the lever by its bolt, throw it, and press the button.",
@@ -63,9 +62,6 @@ class CellUnlock(CellTask):
 
     def ways(self, state: State) -> list[Floats]:
         """Of the tips to what they work, and of bolt and lever until they are on."""
-        tips = [
-            norm(transform(state.pose(part), state.array((point,))) - state.tcp_position(arm))
-            for arm, (part, point) in PLACES.items()
-        ]
+        tips = [self.tip_distance(state, arm, part, point) for arm, (part, point) in PLACES.items()]
         lever = 0.2 * maximum(THROWN - state.joint("lock", "lever"), 0.0)
         return [*tips, maximum(DRAWN - state.joint("lock", "bolt"), 0.0), lever]

@@ -51,19 +51,9 @@ class ActionReader:
         return flat
 
     def _join(self, action: Mapping[str, Any], count: int) -> NDArray[np.float32]:
-        for name in action:
-            if name not in self._split:
-                raise UnknownNameError("robot of this layout", name, self._split)
-        needed = [name for name, part in self._split.items() if part.stop > part.start]
-        missing = [name for name in needed if name not in action]
-        if missing:
-            raise ActionError(
-                f"the action has no numbers for {missing}; the robots are {list(self._split)}"
-            )
         parts = [
             self._array(action[name], count, part.stop - part.start, f"the action of {name!r}")
-            for name, part in self._split.items()
-            if name in action
+            for name, part in given_robots(action, self._split).items()
         ]
         return np.concatenate(parts, axis=1)
 
@@ -100,3 +90,19 @@ class ActionReader:
             f"action number {column} is {flat[row, column]} in environment {env}: that is number"
             f" {number.index} ({number.name}) of robot {name!r}; nothing was moved"
         )
+
+
+def given_robots(action: Mapping[str, Any], split: Mapping[str, slice]) -> dict[str, slice]:
+    """Return the part of each robot that an action by robot's name moves, in the layout's order.
+
+    Raises:
+        UnknownNameError: If one of its names is no robot's.
+        ActionError: If it lacks a robot that takes numbers.
+    """
+    for name in action:
+        if name not in split:
+            raise UnknownNameError("robot of this layout", name, split)
+    needed = [name for name, part in split.items() if part.stop > part.start]
+    if missing := [name for name in needed if name not in action]:
+        raise ActionError(f"the action has no numbers for {missing}; the robots are {list(split)}")
+    return {name: part for name, part in split.items() if name in action}

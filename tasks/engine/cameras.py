@@ -13,7 +13,7 @@ from typing_extensions import NotRequired, TypedDict
 from layouts import Layout
 from robot_layouts.core.bounds import FAR, checked_numbers, checked_whole, shown
 from robot_layouts.core.schema import FieldError, Object, check
-from robot_layouts.simulation.scene.cameras import (
+from robot_layouts.simulation.cameras import (
     DEFAULT_FOV,
     FIELD_OF_VIEW,
     SIZE,
@@ -29,6 +29,7 @@ from robots import RobotLayoutsError, TaskError, UnknownNameError
 from robots.descriptor import IDENTITY, Vector3
 from tasks.native.format import observation_keys
 from tasks.randomization.declaration import read_data
+from tasks.randomization.distributions import as_whole
 
 Size = tuple[int, int]
 """Width and height of a picture (pixels)."""
@@ -237,12 +238,8 @@ def _with_whole_sizes(data: Any) -> Any:
     if not isinstance(data, dict):
         return data
     named = cast("dict[str, Any]", data)
-    sizes = {n: int(x) for n, x in named.items() if n in ("width", "height") and _is_whole(x)}
+    sizes = {n: as_whole(x) for n, x in named.items() if n in ("width", "height")}
     return {name: _with_whole_sizes(value) for name, value in named.items()} | sizes
-
-
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, float) and value.is_integer()
 
 
 def _with(camera: AnyCamera, **changed: Any) -> AnyCamera:

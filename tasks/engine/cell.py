@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import atan2, hypot
 from typing import Any, ClassVar
 
 from robot_layouts.simulation import PhysicsSettings, State, World
-from robot_layouts.simulation.maths import Array, Flags, Floats, floats
+from robot_layouts.simulation.maths import Array, Flags, Floats, floats, norm
 from robots.descriptor import Vector3
 from tasks.engine.env import MultiRobotTask
 from tasks.engine.task import Info
 from tasks.language.bodies import Body, Object, WideTable
 from tasks.language.randomness import EpisodeRandom
-from tasks.language.terms import closeness, inverse, transform
+from tasks.language.terms import closeness, inverse, is_at_rest, transform
 
 OF_STAGES = 0.6  # of the reward
 
@@ -151,7 +151,31 @@ class CellTask(MultiRobotTask):
         """
         return self.is_within(state, body, other, low, high) & ~state.is_grasping(arm, body)
 
-    def count(self, flags: Sequence[Array]) -> Floats:
+    def held_and_left(
+        self, state: State, bodies: Mapping[str, str], near: float
+    ) -> tuple[Floats, Floats]:
+        """Return how many bodies arms hold, and how many rest at the ends of `ways`, let go, (N,).
+
+        Args:
+            state: The state.
+            bodies: By arm, what it brings, in the order of `ways`.
+            near: How near to its end a way is to be (m).
+        """
+        held = [state.is_grasping(arm, body) for arm, body in bodies.items()]
+        ended = zip(bodies.values(), self.ways(state), held, strict=True)
+        left = [(way <= near) & is_at_rest(state, body) & ~holds for body, way, holds in ended]
+        return self.count(held), self.count(left)
+
+    def count(self, flags: Iterable[Array]) -> Floats:
         """Return how many of some flags, each (N,) bool, are true, (N,)."""
         total: Any = sum(map(floats, flags))
         return total
+
+    def passed(self, count: Floats, *least: float) -> dict[str, Flags]:
+        """Return the last stages, one for each number: passed where the count is at least that."""
+        stages = [*self.stages][-len(least) :]
+        return {stage: count >= number for stage, number in zip(stages, least, strict=True)}
+
+    def tip_distance(self, state: State, arm: str, part: str, point: Vector3) -> Floats:
+        """Return how far an arm's TCP is from a point in a body's frame, (N,) (m)."""
+        return norm(transform(state.pose(part), state.array((point,))) - state.tcp_position(arm))

@@ -9,6 +9,7 @@ import numpy as np
 
 from layouts import Layout
 from robot_layouts.simulation import Simulation, State, World
+from robot_layouts.simulation.checks.overlaps import empty
 from robot_layouts.simulation.maths import Floats, all_finite
 from robots.descriptor import Vector3
 from tasks.engine.divergence import NotFinite
@@ -156,7 +157,7 @@ class ColumnObserver:
         """
         count = len(state.joint_positions)
         if self._copies is None:
-            self._copies = Simulation(self._layout, _nothing, count)
+            self._copies = Simulation(self._layout, empty, count)
         still = np.zeros((count, 6), np.float32)
         rows = {
             place: np.concatenate(
@@ -167,7 +168,3 @@ class ColumnObserver:
         self._copies.write(range(count), {}, rows)
         read = self._copies.read()
         return {arm: read.tcp_pose(arm) for arm in self._layout.arms}
-
-
-def _nothing(world: World, index: int) -> None:
-    """Add no body to a world."""

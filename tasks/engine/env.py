@@ -17,7 +17,7 @@ from robot_layouts.core.processes.start import preload
 from robot_layouts.simulation import Simulation, State, World
 from robot_layouts.simulation.framed import Fit, FramedState, FramedWorld
 from robot_layouts.simulation.maths import Array, Floats, all_finite
-from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.world import Part
 from robots import SimulationError, TaskError
 from tasks.engine.actions import ActionReader
 from tasks.engine.cameras import camera_for_people

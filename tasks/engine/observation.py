@@ -12,8 +12,7 @@ from gymnasium.spaces import Box, Dict, Space
 
 from layouts import Layout
 from robot_layouts.simulation import Camera, Simulation, State
-from robot_layouts.simulation.maths import Array, Floats, all_finite
-from robot_layouts.simulation.scene.cameras import (
+from robot_layouts.simulation.cameras import (
     RAW,
     SHADERS,
     TEXTURES,
@@ -22,6 +21,7 @@ from robot_layouts.simulation.scene.cameras import (
     shaders_for,
     told_by,
 )
+from robot_layouts.simulation.maths import Array, Floats, all_finite
 from robots import TaskError, unknown_name_message
 from tasks.engine.cameras import Configs, Size, cameras_of, configured, expect_apart, resized
 from tasks.engine.columns import (

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 
 from robot_layouts.simulation import Simulation
-from robot_layouts.simulation.scene.cameras import AnyCamera
+from robot_layouts.simulation.cameras import AnyCamera
 
 if TYPE_CHECKING:
     from robot_layouts.simulation.rendering import Observers, View

@@ -9,9 +9,10 @@ import re
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-from robots import MissingPackageError
-from tasks.interfaces.spec import NAMESPACE, TaskSpec
-from tasks.registry import list_own
+from gymnasium.envs.registration import EnvSpec
+
+from robot_layouts.core.importing import optional
+from tasks.registry import get_task_class, list_own
 
 if TYPE_CHECKING:
     from tasks.interfaces.device import DeviceTask
@@ -99,14 +100,9 @@ def parallel_env(
         UnknownNameError: If the task, a place, a robot or a field is unknown.
         TaskError: If the task cannot be made like that.
     """
-    try:
-        from tasks.interfaces.parallel import ParallelTask
-    except ModuleNotFoundError as error:
-        if error.name != "pettingzoo":
-            raise
-        raise MissingPackageError(
-            "parallel_env needs pettingzoo; pip install 'robot-layouts[pettingzoo]'"
-        ) from error
+    optional("pettingzoo", "parallel_env needs pettingzoo", "pettingzoo")
+    from tasks.interfaces.parallel import ParallelTask
+
     return ParallelTask(task_id, robot_reward, **fields)
 
 
@@ -133,14 +129,9 @@ def sb3_vec_env(
         AssetError: If robot files cannot be found.
         VectorWorkerError: If a worker ends before it is ready.
     """
-    try:
-        from tasks.interfaces.sb3 import SB3Task
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.partition(".")[0] != "stable_baselines3":
-            raise
-        raise MissingPackageError(
-            "sb3_vec_env needs stable-baselines3; pip install 'robot-layouts[sb3]'"
-        ) from error
+    optional("stable_baselines3", "sb3_vec_env needs stable-baselines3", "sb3")
+    from tasks.interfaces.sb3 import SB3Task
+
     return SB3Task(task_id, num_envs, num_workers=num_workers, **fields)
 
 
@@ -170,3 +161,23 @@ def lerobot_vec_env(
     from tasks.interfaces.lerobot import LeRobotTask
 
     return LeRobotTask(task_id, num_envs, num_workers=num_workers, **fields)
+
+
+NAMESPACE = "RobotLayouts"  # Gymnasium ids are RobotLayouts/PickCube-v1
+
+
+class TaskSpec(EnvSpec):
+    """An entry of Gymnasium's registry that knows how long a task's episodes are.
+
+    It asks the task's class, and only when it is asked itself: importing `tasks` loads no task.
+    """
+
+    def _steps(self) -> int:
+        """Return what was set, or given to `gymnasium.make_vec`, or the task's own."""
+        known = self._set_steps or self.kwargs.get("max_episode_steps")
+        return known or get_task_class(self.id.rpartition("/")[2]).max_episode_steps
+
+    def _set(self, steps: int | None) -> None:
+        self._set_steps = steps
+
+    max_episode_steps = property(_steps, _set)  # pyright: ignore[reportAssignmentType]

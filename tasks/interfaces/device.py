@@ -13,8 +13,9 @@ from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
 from robot_layouts.core.bounds import checked_whole, shown
-from robot_layouts.simulation.mujoco_warp.arrays import beside
-from robots import ActionError, SimulationError, TaskError, UnknownNameError
+from robot_layouts.simulation.mujoco_warp.state import beside
+from robots import ActionError, SimulationError, TaskError
+from tasks.engine.actions import given_robots
 from tasks.engine.checks import ELAPSED, SEED, SOLVED, SUCCESS, checked_options, checked_seeds
 from tasks.engine.env import TaskEnv
 from tasks.engine.observation import JOINTS, STATE_FORMS
@@ -347,13 +348,8 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
     def _read(self, actions: Any) -> Tensor:
         """Return an action as (N, A) float32 on the device."""
         if isinstance(actions, Mapping):
-            names = [name for name, part in self.action_split.items() if part.stop > part.start]
-            for name in actions:
-                if name not in self.action_split:
-                    raise UnknownNameError("robot of this layout", name, self.action_split)
-            if missing := [name for name in names if name not in actions]:
-                raise ActionError(f"the action has no numbers for {missing}")
-            actions = torch.cat([self._tensor(actions[name]) for name in names], 1)
+            robots = given_robots(actions, self.action_split)
+            actions = torch.cat([self._tensor(actions[name]) for name in robots], 1)
         action = self._tensor(actions)
         if action.shape != self.action_space.shape:
             raise ActionError(

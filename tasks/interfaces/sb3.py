@@ -21,7 +21,7 @@ from robots import SimulationError, TaskError
 from tasks.arrays import leaves
 from tasks.engine.checks import RECONFIGURE, own_options
 from tasks.engine.remade import Remade
-from tasks.interfaces.spec import NAMESPACE
+from tasks.interfaces import NAMESPACE
 from tasks.interfaces.vector import UnknownAttributeError, VectorTask
 from tasks.registry import get_task_class
 

@@ -20,7 +20,7 @@ from robot_layouts.core.operating_system import HAS_WORKERS, cores
 from robots import SimulationError, TaskError, UnknownNameError, unknown_name_message
 from tasks.arrays import nested, row_of
 from tasks.engine.actions import ActionReader
-from tasks.engine.checks import RECONFIGURE, SUCCESS, checked_options, checked_seeds
+from tasks.engine.checks import RECONFIGURE, SUCCESS, checked_ids, checked_options, checked_seeds
 from tasks.engine.observation import space_of
 from tasks.engine.places import built_layout
 from tasks.engine.remade import Remade
@@ -381,18 +381,10 @@ class VectorTask(Remade, VectorEnv[Any, NDArray[np.float32], NDArray[Any]]):
     # -- checks ------------------------------------------------------------------------------
 
     def _checked_ids(self, env_ids: Any) -> NDArray[np.intp]:
-        ids = np.asarray(env_ids)
-        if ids.ndim != 1 or ids.dtype.kind not in "iu" or not len(ids):
-            raise TaskError(
-                f"env_ids must be a list of integers, at least one, not {env_ids!r}; recv() returns"
-                " them in info['env_id']"
-            )
-        if ids.min() < 0 or ids.max() >= self.num_envs:
-            wrong = ids[(ids < 0) | (ids >= self.num_envs)].tolist()
-            raise TaskError(f"env_ids {wrong} must lie from 0 to {self.num_envs - 1}")
-        if len(np.unique(ids)) < len(ids):
-            raise TaskError(f"env_ids names environments more than once: {ids.tolist()}")
-        return ids.astype(np.intp, copy=False)
+        ids = checked_ids([] if env_ids is None else env_ids, self.num_envs)
+        if not ids:
+            raise TaskError(f"env_ids is {env_ids}; one at least is needed, as of info['env_id']")
+        return np.array(ids, np.intp)
 
     def _checked_options(self, options: Mapping[str, Any] | None) -> tuple[_Flags, bool]:
         options = checked_options(options)

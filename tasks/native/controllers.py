@@ -70,13 +70,34 @@ def _entries(layout: Layout, kept: Sequence[Remembered]) -> tuple[Entry, ...]:
     return tuple(listed)
 
 
+def native_joints(index: ReadoutIndex, robot: str, rows: NDArray[Any]) -> NDArray[Any]:
+    """Return joints that are in the order of a robot's descriptor in native's, which is SAPIEN's.
+
+    Args:
+        index: Knows both orders.
+        robot: Its name in the layout.
+        rows: Shape (…, dof).
+    """
+    order = index.loaded_order[robot]
+    return rows if order is None else rows[..., order]
+
+
+def declared_joints(index: ReadoutIndex, robot: str, rows: NDArray[Any]) -> NDArray[Any]:
+    """Return joints that are in native's order in that of a robot's descriptor; see above."""
+    order = index.loaded_order[robot]
+    return rows if order is None else rows[..., np.argsort(order)]
+
+
 def recall(simulation: Simulation, entries: Sequence[Entry]) -> list[Floats]:
     """Return copies of the numbers of entries, each (N, k) (rad, m, wxyz)."""
     if not entries or simulation.modes is None:
         return []
     kept = simulation.modes.recall()
     rows = [np.concatenate([kept[i] for i in entry.parts], 1) for entry in entries]
-    return [_ordered(simulation.index, *pair) for pair in zip(entries, rows, strict=True)]
+    return [
+        native_joints(simulation.index, entry.robot, own) if entry.joints else own
+        for entry, own in zip(entries, rows, strict=True)
+    ]
 
 
 def restore(
@@ -97,36 +118,28 @@ def restore(
         return
     for name, rows in given.items():
         entry = keys[name]
-        order = simulation.index.loaded_order[entry.robot] if entry.joints else None
-        rows = rows if order is None else rows[:, np.argsort(order)]
+        if entry.joints:
+            rows = declared_joints(simulation.index, entry.robot, rows)
         ends = np.cumsum(entry.sizes)[:-1]
         for part, own in zip(entry.parts, np.split(rows, ends, 1), strict=True):
             simulation.modes.restore(part, own, env_ids)
 
 
-def by_robot(
-    entries: Sequence[Entry], rows: Sequence[NDArray[Any]], robots: Mapping[str, str | None]
-) -> dict[str, NDArray[Any]]:
-    """Return rows by native's names, which begin with the robot's key where it has one.
+def by_robot(entries: Sequence[Entry], robots: Mapping[str, str | None]) -> dict[str, Entry]:
+    """Return entries by native's names, which begin with the robot's key where it has one.
 
     Args:
         entries: What robots remember.
-        rows: Their numbers.
         robots: Native's key of each robot, or None where native has one robot.
     """
-    found: dict[str, NDArray[Any]] = {}
-    for entry, own in zip(entries, rows, strict=True):
-        key = robots[entry.robot]
-        found[entry.key if key is None else f"{key}/{entry.key}"] = own
-    return found
+    keys = [robots[entry.robot] for entry in entries]
+    return {
+        entry.key if key is None else f"{key}/{entry.key}": entry
+        for key, entry in zip(keys, entries, strict=True)
+    }
 
 
 def _whole(layout: Layout, robot: str, own: Sequence[Remembered]) -> bool:
     groups = layout[robot].robot.action_split.groups
     driven = {name for name, group in groups.items() if group.size}
     return {part.group for part in own} == driven and all(part.kind == _JOINTS for part in own)
-
-
-def _ordered(index: ReadoutIndex, entry: Entry, rows: Floats) -> Floats:
-    order = index.loaded_order[entry.robot] if entry.joints else None
-    return rows if order is None else rows[:, order]

@@ -21,7 +21,7 @@ from robot_layouts.simulation.world import WorldBody, part_name
 from robots import TaskError, unknown_name_message
 from tasks.arrays import array_of, leaves, nested
 from tasks.native import controllers
-from tasks.native.controllers import CONTROLLER
+from tasks.native.controllers import CONTROLLER, declared_joints, native_joints
 
 StateDict = dict[str, dict[str, Any]]
 """Tensors by group and entry; those of what control modes remember are nested as in native."""
@@ -60,24 +60,6 @@ def articulation_keys(layout: Layout) -> dict[str, str]:
     if len(layout) == 1:
         return {name: placement.robot.name for name, placement in layout.items()}
     return {name: f"{p.robot.name}-agent-{i}" for i, (name, p) in enumerate(layout.items())}
-
-
-def native_joints(index: ReadoutIndex, robot: str, rows: NDArray[Any]) -> NDArray[Any]:
-    """Return joints that are in the order of a robot's descriptor in native's, which is SAPIEN's.
-
-    Args:
-        index: Knows both orders.
-        robot: Its name in the layout.
-        rows: Shape (…, dof).
-    """
-    order = index.loaded_order[robot]
-    return rows if order is None else rows[..., order]
-
-
-def declared_joints(index: ReadoutIndex, robot: str, rows: NDArray[Any]) -> NDArray[Any]:
-    """Return joints that are in native's order in that of a robot's descriptor; see above."""
-    order = index.loaded_order[robot]
-    return rows if order is None else rows[..., np.argsort(order)]
 
 
 def native_places(index: ReadoutIndex, layout: Layout, arm: str) -> NDArray[np.intp]:
@@ -132,9 +114,8 @@ def read_state_dict(simulation: Simulation, state: State) -> StateDict:
 
 def _remembered(simulation: Simulation) -> dict[str, Floats]:
     """Return what control modes remember by native's names, each (N, k)."""
-    entries = controllers.entries(simulation)
-    rows = controllers.recall(simulation, entries)
-    return controllers.by_robot(entries, rows, observation_keys(simulation.layout))
+    rows = controllers.recall(simulation, controllers.entries(simulation))
+    return dict(zip(_targets(simulation), rows, strict=True))
 
 
 def _joined(*parts: Floats) -> Tensor:
@@ -304,11 +285,9 @@ def write_state_dict(
 
 def _targets(simulation: Simulation) -> dict[str, controllers.Entry]:
     """Return what control modes remember by native's names."""
-    keys = observation_keys(simulation.layout)
-    return {
-        entry.key if keys[entry.robot] is None else f"{keys[entry.robot]}/{entry.key}": entry
-        for entry in controllers.entries(simulation)
-    }
+    return controllers.by_robot(
+        controllers.entries(simulation), observation_keys(simulation.layout)
+    )
 
 
 class _Entry(NamedTuple):

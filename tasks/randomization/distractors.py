@@ -17,10 +17,8 @@ from objects.shapes import Capsule
 from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole
 from robot_layouts.simulation import Box, Cylinder, Shape, Simulation, Sphere, State, World
 from robot_layouts.simulation.maths import Floats
-from robot_layouts.simulation.scene.looks import Paint
-from robot_layouts.simulation.scene.parts import Part
-from robot_layouts.simulation.scene.variation import Variation
-from robot_layouts.simulation.world import BodyKind, WorldBody
+from robot_layouts.simulation.variation import Paint, Variation
+from robot_layouts.simulation.world import BodyKind, Part, WorldBody
 from robots import TaskError
 from robots.descriptor import Vector3
 from tasks.randomization.distributions import Distribution, Stream, Uniform, as_whole

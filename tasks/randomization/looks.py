@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
-from robot_layouts.simulation.scene.looks import (
+from robot_layouts.simulation.variation import (
     PATTERNS,
     CameraOffset,
     Glow,
@@ -14,7 +14,7 @@ from robot_layouts.simulation.scene.looks import (
     Paint,
     Pattern,
 )
-from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.world import Part
 from robots.descriptor import Vector3
 from tasks.randomization.distributions import Choice, Distribution, Whole
 from tasks.randomization.groups import (

@@ -14,7 +14,7 @@ from layouts import Layout
 from robot_layouts.kinematics.quaternions import multiplied, yaw_quaternion
 from robot_layouts.simulation import Camera, Simulation, State, World
 from robot_layouts.simulation.maths import Floats
-from robot_layouts.simulation.scene.variation import Variation
+from robot_layouts.simulation.variation import Variation
 from robots.descriptor import Vector3
 from tasks.arrays import leaves
 from tasks.randomization.declaration import AXES, Randomization

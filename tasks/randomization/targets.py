@@ -9,10 +9,9 @@ from typing import Any, NamedTuple, TypeVar
 from layouts import Layout
 from objects.shapes import SIZED
 from robot_layouts.simulation import Camera, Simulation
-from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera, camera_name
-from robot_layouts.simulation.scene.looks import LIGHTS
-from robot_layouts.simulation.scene.parts import Part
-from robot_layouts.simulation.world import WorldBody
+from robot_layouts.simulation.cameras import AnyCamera, RobotCamera, camera_name
+from robot_layouts.simulation.variation import LIGHTS
+from robot_layouts.simulation.world import Part, WorldBody
 from robots import UnknownNameError
 
 Thing = TypeVar("Thing")

@@ -8,8 +8,7 @@ import pytest
 from layouts import Layout, Placement
 from robot_layouts.core.progress import Progress
 from robot_layouts.motion import NoPlanError, plan
-from robot_layouts.motion.collision.cell import Cell
-from robot_layouts.motion.collision.clearances import Clearances
+from robot_layouts.motion.collision.cell import Cell, Clearances
 from robot_layouts.motion.model.obstacles import Track, box
 from robot_layouts.motion.planning.goals import PlaceGoal
 from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs

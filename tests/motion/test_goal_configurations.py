@@ -7,8 +7,7 @@ import pytest
 
 from layouts import single
 from robot_layouts.motion import NoPlanError, TcpGoal, plan
-from robot_layouts.motion.collision.cell import Cell
-from robot_layouts.motion.collision.clearances import Clearances
+from robot_layouts.motion.collision.cell import Cell, Clearances
 from robot_layouts.motion.model.obstacles import box
 from robot_layouts.motion.planning.goals import PlaceGoal, read_targets
 from robot_layouts.motion.planning.query import choices, find_goal_configurations

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.teleop import served
 from layouts import face_to_face
-from robot_layouts.motion.output.page import motion_cell
+from robot_layouts.motion.output.scenes import motion_cell
 from tests.experts.free_motions import swing
 from tests.motion.motions import LAYOUT, busy_motion
 from tests.pages import browser_page, changed, coloured, settled

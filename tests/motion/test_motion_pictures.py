@@ -60,10 +60,10 @@ def test_nothing_is_left_of_a_picture_that_cannot_be_made(motion, tmp_path):
 def test_what_is_drawn_is_what_the_certificate_says():
     motion = swing(face_to_face({"left": "panda", "right": "panda"}, spacing=1.4), seconds=0.8)
     scenes, certificate = Scenes(motion), motion.certify()
-    found = scenes.distances(np.linspace(0, motion.duration, 81))
+    distances, nearest = scenes.distances(np.linspace(0, motion.duration, 81))
     assert certificate.clearance is not None
-    assert found.least.min() == pytest.approx(certificate.clearance.distance, abs=1e-3)
-    assert set(found.nearest) == set(certificate.clearance.names)
+    assert distances.min() == pytest.approx(certificate.clearance.distance, abs=1e-3)
+    assert set(nearest) == set(certificate.clearance.names)
     shares = scenes.speeds(np.linspace(0, motion.duration, 200))
     assert max(map(np.max, shares.values())) == pytest.approx(certificate.velocity, rel=0.01)
     ways = scenes.tcp_ways(np.array([0.0, motion.duration]))

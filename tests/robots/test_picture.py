@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
-from robot_layouts.simulation.checks.try_command import inspect
+from robot_layouts.simulation.checks.commands import inspect_robots as inspect
 from robots import DescriptorError, RobotRegistry
 from robots.named import guessed_robot
 from robots.picture import FINGER, draw, save_picture

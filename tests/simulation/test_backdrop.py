@@ -8,11 +8,11 @@ import pytest
 import tasks
 from layouts import single
 from robot_layouts.simulation import Box, Camera, Simulation, World
+from robot_layouts.simulation.cameras import SHADERS
 from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backdrop import LAYERED
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.studio import Studio
-from robot_layouts.simulation.scene.cameras import SHADERS
 from tests.quick import quick_cases
 
 CAMERAS = {

@@ -11,9 +11,8 @@ from layouts import single
 from robot_layouts.simulation import Box, PhysicsSettings, Simulation
 from robot_layouts.simulation.backend import Built
 from robot_layouts.simulation.control.joint_positions import JointPositionController
-from robot_layouts.simulation.mujoco_warp.control import DevicePositions
+from robot_layouts.simulation.mujoco_warp.control import DeviceFollower, DevicePositions
 from robot_layouts.simulation.mujoco_warp.state import DeviceIndex, DeviceState, grasped
-from robot_layouts.simulation.mujoco_warp.tcp import DeviceFollower
 from robot_layouts.simulation.solvers import FOLLOWING, TreeFollower
 from robots import Fingers, RobotRegistry
 from robots.from_urdf import guess_descriptor

@@ -9,8 +9,7 @@ import pytest
 
 from layouts import Layout, Placement
 from layouts.frames import Pose
-from robot_layouts.simulation.sapien3.arms import SapienArm
-from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
+from robot_layouts.simulation.sapien3.arms import PinocchioFollower, SapienArm
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.solvers import ArmModel, TreeArm, TreeFollower
 from robots import DescriptorError, RobotRegistry, UnknownNameError

@@ -13,7 +13,7 @@ import tasks
 from layouts import Layout, Placement
 from robot_layouts.simulation import PhysicsSettings, Simulation
 from robot_layouts.simulation.checks.tcp_control import ERROR, TcpTrial, try_tcp_control
-from robot_layouts.simulation.control.approximate import nearest_turns
+from robot_layouts.simulation.control.tcp import nearest_turns
 from robots import RobotDescriptor, RobotRegistry
 from tests.quick import quick_cases
 

@@ -113,7 +113,7 @@ class TestCommand:
 
     def test_what_is_wrong_is_its_exit_code(self, tmp_path, capsys, monkeypatch, small):
         monkeypatch.setattr(
-            "robot_layouts.simulation.checks.try_command.named_robot", lambda name: folded(small)
+            "robot_layouts.simulation.checks.commands.named_robot", lambda name: folded(small)
         )
         assert main(["robots", "inspect", "--try", "folded"]) == 1
         printed = capsys.readouterr().out

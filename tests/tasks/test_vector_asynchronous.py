@@ -144,12 +144,12 @@ def test_it_tells_what_it_cannot_do(shared):
     with pytest.raises(SimulationError, match=r"environments \[3\] were sent actions before"):
         shared.step(np.zeros((NUM_ENVS, 8), np.float32))
     for wrong, message in (
-        ([5], r"env_ids \[5\] must lie from 0 to 4"),
-        ([-1], r"env_ids \[-1\] must lie from 0 to 4"),
-        ([0, 0], "more than once"),
-        ([0.5], "list of integers"),
-        ([], "list of integers"),
-        (2, "list of integers"),
+        ([5], r"env_ids \[5\] must be different numbers from 0 to 4"),
+        ([-1], r"env_ids \[-1\] must be different numbers from 0 to 4"),
+        ([0, 0], "must be different numbers"),
+        ([0.5], "sequence of integers"),
+        ([], "one at least is needed"),
+        (2, "sequence of integers"),
     ):
         with pytest.raises(TaskError, match=message):
             shared.send(one, wrong)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.simulation.cameras import AnyCamera, RobotCamera
 from robot_layouts.simulation.rendering import SIZE
-from robot_layouts.simulation.scene.cameras import AnyCamera, RobotCamera
 from robots import TaskError, UnknownNameError
 from tasks import TaskEnv
 from tasks.engine.cameras import (

@@ -31,7 +31,7 @@ from robot_layouts.kinematics.rotations import (
     rotation_of,
 )
 from robot_layouts.simulation.checks.overlaps import RobotsAlone
-from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.world import Part
 from robots import TaskError
 from tasks import TaskEnv
 

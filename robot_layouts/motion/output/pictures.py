@@ -15,6 +15,7 @@ from layouts.preview import TABLE
 from layouts.validation.findings import length_text
 from robot_layouts.core.errors import MotionError
 from robot_layouts.core.figures import COLOURS, FAINT, INK, SUPPORTED, blank_figure
+from robot_layouts.core.importing import optional
 from robot_layouts.core.progress import Progress
 from robot_layouts.core.writing import written_whole
 from robot_layouts.kinematics.quaternions import forward
@@ -22,7 +23,6 @@ from robot_layouts.kinematics.rotations import Floats, transform
 from robot_layouts.motion.model.bodies import CellSolid
 from robot_layouts.motion.output.scenes import Scenes
 from robot_layouts.motion.timed_motion import TimedMotion
-from robots import MissingPackageError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -273,15 +273,15 @@ class _Picture:
 
     def _draw_distances(self, strip: Axes) -> None:
         times = np.linspace(0, self._motion.duration, SAMPLES)
-        found = self._scenes.distances(times)
+        distances, nearest = self._scenes.distances(times)
         self._begin_strip(strip, "distance (cm)")
-        if not found.nearest:
+        if not nearest:
             strip.text(
                 0.5, 0.5, "nothing is near", transform=strip.transAxes, color=FAINT, ha="center"
             )
             strip.set_yticks([])
             return
-        centimetres = 100 * found.least
+        centimetres = 100 * distances
         least = int(np.nanargmin(centimetres))
         strip.plot(times, centimetres, color=INK, linewidth=1.8)
         strip.plot(times[least], centimetres[least], "o", color=INK, markersize=5)
@@ -293,8 +293,8 @@ class _Picture:
                 "asked for", (self._motion.duration, asked), (-3, 2), textcoords="offset points",
                 color=LIMIT["color"], fontsize=7.5, ha="right",
             )  # fmt: skip
-        one, other = (name.replace("/", "'s ") for name in found.nearest)
-        near = found.least[least]
+        one, other = (name.replace("/", "'s ") for name in nearest)
+        near = distances[least]
         text = f"{'least' if near >= 0 else 'overlap'}: {length_text(abs(near))}, {one} and {other}"
         ink = INK if near >= 0 else LIMIT["color"]
         strip.set_title(text, loc="right", color=ink, fontsize=9, pad=3)
@@ -323,12 +323,7 @@ class _Picture:
 
 
 def _write_frames(frames: Sequence[Any], path: Path, kind: str) -> None:
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise MissingPackageError(
-            "a moving picture needs pillow: pip install 'robot-layouts[view]'"
-        ) from error
+    Image = optional("PIL.Image", "a moving picture needs pillow", "view")
     first, *others = [Image.fromarray(frame) for frame in frames]
     milliseconds = [1000 // FRAMES] * len(others) + [int(1000 * REST)]
     settings: dict[str, Any] = {"quality": 80, "method": 4} if kind == "webp" else {}

@@ -1,33 +1,18 @@
-"""What pictures and pages of a motion show: bodies, ways of TCPs, distances and speeds."""
+"""What pictures of a motion show: bodies, ways of TCPs, distances and speeds; and its page."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from robot_layouts.kinematics.rotations import Floats, transform
+from layouts.viewer import ShownCell, ShownMotion, Thing
+from layouts.visuals import Visual, coloured
+from robot_layouts.kinematics.rotations import Floats, quaternion_of, transform
 from robot_layouts.motion.certificate import largest_velocities
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.model.bodies import CellSolid
-from robot_layouts.motion.model.obstacles import Held
+from robot_layouts.motion.model.obstacles import Held, Obstacle, Track
 from robot_layouts.motion.timed_motion import TimedMotion
 from robots.urdf.tcp import find_tcp
-
-
-@dataclass(frozen=True, eq=False)
-class Distances:
-    """What comes how near over time.
-
-    Attributes:
-        times: (n,) (s).
-        least: Least distance of a robot from another or an obstacle, (n,) (m); NaN if all is far.
-        nearest: The two bodies that come nearest of all, by name; empty if none do.
-    """
-
-    times: Floats
-    least: Floats
-    nearest: tuple[str, ...]
 
 
 class Scenes:
@@ -85,18 +70,21 @@ class Scenes:
             ways[arm] = tcp.places(poses[:, own])
         return ways
 
-    def distances(self, times: Floats) -> Distances:
-        """Return how near robots come to each other and to what stands around."""
+    def distances(self, times: Floats) -> tuple[Floats, tuple[str, ...]]:
+        """Return how near robots come to each other and to what stands around.
+
+        Returns:
+            The least distance of a robot from another or an obstacle, (n,) (m); NaN if all is far.
+            And the names of the two bodies that come nearest of all; none if all is far.
+        """
         checker = self.cell.between_owners()
         contacts = [
             checker.nearest(state, time)
             for state, time in zip(self.states(times), times.tolist(), strict=True)
         ]
         least = np.array([np.nan if c is None else c.distance for c in contacts])
-        if np.isnan(least).all():
-            return Distances(times, least, ())
-        contact = contacts[int(np.nanargmin(least))]
-        return Distances(times, least, () if contact is None else tuple(contact.names))
+        contact = None if np.isnan(least).all() else contacts[int(np.nanargmin(least))]
+        return least, () if contact is None else contact.names
 
     def speeds(self, times: Floats) -> dict[str, Floats]:
         """Return by robot the largest share that a joint uses of its largest velocity, (n,)."""
@@ -109,3 +97,67 @@ class Scenes:
 
 def _stands(cell: Cell, solid: CellSolid) -> bool:
     return not solid.mover and cell.parts[solid.part].track is None
+
+
+HIDDEN = ("frames", "reach")  # they would hide the ways
+MOMENTS = 30  # per second
+WAY_POINTS = 25  # per second
+OBSTACLE = (0.55, 0.55, 0.55, 1.0)
+HELD = (0.95, 0.75, 0.2, 1.0)
+TABLE = (0.87, 0.81, 0.72, 1.0)
+
+
+def motion_cell(motion: TimedMotion, title: str) -> ShownCell:
+    """Return what a page shows of a motion.
+
+    Raises:
+        AssetError: If a robot's files cannot be found or are invalid.
+        MissingPackageError: If trimesh or python-fcl is not installed.
+    """
+    scenes = Scenes(motion)
+    times = np.linspace(0, motion.duration, 1 + max(1, round(motion.duration * MOMENTS)))
+    things: dict[str, Thing] = {}
+    poses: dict[str, Floats] = {}
+    for obstacle in motion.obstacles:
+        rows = _rows(obstacle.poses(times, len(times)))
+        things[obstacle.name] = Thing(_parts(obstacle, OBSTACLE), rows[0])
+        if isinstance(obstacle.pose, Track):
+            poses[obstacle.name] = rows
+    for held in motion.held:
+        rows = _rows(scenes.held_poses(held, times))
+        things[held.obstacle.name] = Thing(_parts(held.obstacle, HELD), rows[0])
+        poses[held.obstacle.name] = rows
+    if motion.table is not None:
+        things["(table)"] = Thing((_slab(*motion.table),), np.eye(7)[3])
+    own = ShownMotion(float(times[1]), motion.sample(times), poses, name="Motion")
+    return ShownCell(title, motion.layout, things, own, ways=_ways(scenes), hidden=HIDDEN)
+
+
+def _ways(scenes: Scenes) -> dict[str, list[Floats]]:
+    duration = scenes.motion.duration
+    times = np.linspace(0, duration, 2 + round(duration * WAY_POINTS))
+    ways: dict[str, list[Floats]] = {}
+    for arm, way in scenes.tcp_ways(times).items():
+        ways.setdefault(scenes.motion.layout.owner(arm), []).append(way)
+    return ways
+
+
+def _parts(obstacle: Obstacle, rgba: tuple[float, float, float, float]) -> tuple[Visual, ...]:
+    import trimesh
+
+    return tuple(coloured(trimesh.convex.convex_hull(shape), rgba) for shape in obstacle.shapes)
+
+
+def _slab(x_min: float, y_min: float, x_max: float, y_max: float) -> Visual:
+    """Return a table's top, just below z = 0."""
+    import trimesh
+
+    thickness = 0.02
+    slab = trimesh.creation.box((x_max - x_min, y_max - y_min, thickness))
+    slab.apply_translation(((x_min + x_max) / 2, (y_min + y_max) / 2, -thickness / 2 - 0.001))
+    return coloured(slab, TABLE)
+
+
+def _rows(poses: Floats) -> Floats:
+    """Return poses, (n, 4, 4), as position (m) and quaternion (wxyz), (n, 7)."""
+    return np.concatenate([poses[:, :3, 3], quaternion_of(poses[:, :3, :3])], axis=1)

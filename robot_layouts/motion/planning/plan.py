@@ -17,9 +17,8 @@ from robot_layouts.core.bounds import FAR, checked_number, checked_numbers, chec
 from robot_layouts.core.errors import MotionError, NoPlanError
 from robot_layouts.core.progress import Progress
 from robot_layouts.kinematics.rotations import Floats
-from robot_layouts.motion.collision.cell import Cell, cell_of
+from robot_layouts.motion.collision.cell import Cell, Clearances, cell_of
 from robot_layouts.motion.collision.checker import Checker
-from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.model.bodies import checked_table
 from robot_layouts.motion.model.obstacles import Held, Obstacle
 from robot_layouts.motion.motion import Motion
@@ -28,7 +27,7 @@ from robot_layouts.motion.planning.infeasibility import CUT_OFF
 from robot_layouts.motion.planning.query import Query
 from robot_layouts.motion.planning.space import Resolution, Space
 from robot_layouts.motion.timing.paths import Path
-from robot_layouts.motion.timing.trajectories import CellTrajectory, JointTrajectory, columns_of
+from robot_layouts.motion.timing.trajectories import CellTrajectory, JointTrajectory
 from robot_layouts.motion.timing.velocities import (
     STEP,
     Accelerations,
@@ -182,7 +181,7 @@ def _dynamic_obstacles(cell: Cell, start: Floats, others: Mapping[str, Motion]) 
         if name not in motion.positions or motion.layout[name].robot != robot:
             raise MotionError(f"others[{name!r}] is {motion!r}; it has no {name} that is {robot!r}")
         trajectory = JointTrajectory(
-            columns_of(cell, [name]),
+            np.arange(cell.size)[cell.slices[name]],
             motion.times,
             motion.positions[name],
             motion.velocities[name],

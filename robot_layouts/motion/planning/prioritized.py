@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from robot_layouts.core.errors import NoPlanError
 from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.motion.collision.cell import Clearances
 from robot_layouts.motion.collision.checker import Checker
-from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.planning.rrt_connect import COARSE, connect
 from robot_layouts.motion.planning.shortcuts import shortened
 from robot_layouts.motion.planning.space import Resolution, Space

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from robot_layouts.core.errors import NoPlanError
 from robot_layouts.core.progress import Progress
 from robot_layouts.kinematics.rotations import Floats
-from robot_layouts.motion.collision.cell import Cell
-from robot_layouts.motion.collision.clearances import Clearances
+from robot_layouts.motion.collision.cell import Cell, Clearances
 from robot_layouts.motion.planning.goals import CANDIDATES, PlaceGoal, different
 from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs
 from robot_layouts.motion.planning.prioritized import Coordination
@@ -242,12 +241,7 @@ class Query:
         """
         self.clearances.expect_free_start(self.start)
         self.clearances.relax(self.start)
-        end = self.dynamic_obstacles.end
-        ends = find_goal_configurations(
-            self.targets, self.clearances, self.dynamic_obstacles.positions(end), end
-        )
-        self.clearances.relax(ends[0], self.dynamic_obstacles.end)
-        return ends
+        return self._ends(self.targets)
 
     def reachable_ends(self) -> Floats:
         """Return what `ends` does, of postures that are not known to be cut off from the start.
@@ -255,13 +249,12 @@ class Query:
         Raises:
             NoPlanError: If there are none; all of a goal are cut off, or all others collide.
         """
+        return self._ends([self._reachable(target) for target in self.targets])
+
+    def _ends(self, targets: Sequence[PlaceGoal]) -> Floats:
         end = self.dynamic_obstacles.end
-        ends = find_goal_configurations(
-            [self._reachable(target) for target in self.targets],
-            self.clearances,
-            self.dynamic_obstacles.positions(end),
-            end,
-        )
+        base = self.dynamic_obstacles.positions(end)
+        ends = find_goal_configurations(targets, self.clearances, base, end)
         self.clearances.relax(ends[0], end)
         return ends
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_layouts.core.errors import MissingPackageError
+from robot_layouts.core.importing import optional
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.planning.space import Resolution, Space
 
@@ -66,13 +66,10 @@ def import_ompl() -> tuple[Any, Any, Any]:
     Raises:
         MissingPackageError: If OMPL is not installed.
     """
-    try:
-        from ompl import base, geometric, util
-    except ImportError as error:
-        raise MissingPackageError(
-            "planning needs OMPL, which has wheels for Python 3.10 to 3.13 on Linux and macOS:"
-            " pip install 'robot-layouts[motion]'"
-        ) from error
+    what = "planning needs OMPL, which has wheels for Python 3.10 to 3.13 on Linux and macOS"
+    optional("ompl", what, "motion")
+    from ompl import base, geometric, util
+
     util.setLogLevel(util.LogLevel.LOG_NONE)
     return base, geometric, util
 

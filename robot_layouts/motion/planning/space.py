@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from robot_layouts.motion.collision.checker import Checker
     from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs
 
+PIECES = 6  # straight ones, in which the curve around a point is checked
+
 Resolution = tuple[float, float]  # how far links travel (m) and turn (rad) between two checks
 
 
@@ -99,14 +101,14 @@ class Space:
         if self.proofs is not None:
             self.proofs.expect_one_reachable(self.whole(np.array(goals)))
 
-    def blend_free(self, path: Path, corner: int, resolution: Resolution, pieces: int = 6) -> bool:
+    def blend_free(self, path: Path, corner: int, resolution: Resolution) -> bool:
         """Tell whether the curve around one point of a path is free.
 
         It is checked in straight pieces between places on it.
         """
         middle, half = path.corners[corner], path.blends[corner]
         return self.path_free(
-            path.at(np.linspace(middle - half, middle + half, pieces + 1)), resolution
+            path.at(np.linspace(middle - half, middle + half, PIECES + 1)), resolution
         )
 
     def part(self, robots: Iterable[str], checker: Checker) -> Space:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,9 +85,3 @@ class CellTrajectory:
         """
         count = max(int(np.ceil(self.end / STEP - 1e-6)), 1)
         return np.arange(count + 1.0) * STEP
-
-
-def columns_of(cell: Cell, robots: Iterable[str]) -> NDArray[np.intp]:
-    """Return the indices of all coordinates of some robots."""
-    parts: Sequence[slice] = [cell.slices[name] for name in robots]
-    return np.concatenate([np.arange(part.start, part.stop) for part in parts])

@@ -6,22 +6,19 @@ import logging
 import math
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import lru_cache
-from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from layouts import Layout
 from robot_layouts.core.bounds import checked_number, shown
 from robot_layouts.core.errors import MissingPackageError, MotionError
+from robot_layouts.core.importing import optional
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.timing.paths import Path
-from robot_layouts.motion.timing.sweeps import fastest_speeds
 from robots import RobotDescriptor
 from robots.action_split import JointGroup
-from robots.urdf.reading import read_model
-from robots.urdf.summary import read_urdf
+from robots.urdf.reading import model_of
 
 CONTROL_FREQUENCY = 20.0  # Hz; what tasks use unless they say otherwise
 FASTEST = {"rad": 2.0, "m": 0.5}  # per s; of joints for which no limit is given
@@ -37,7 +34,6 @@ def largest_velocities(
     layout: Layout,
     control_mode: str | Mapping[str, str] | None = None,
     factor: float = 1.0,
-    frequency: float = CONTROL_FREQUENCY,
 ) -> dict[str, Floats]:
     """Return how fast each joint may move by robot, (dof,) (rad/s, m/s).
 
@@ -50,21 +46,17 @@ def largest_velocities(
         layout: The robots.
         control_mode: Of all robots, or by arm; None for that of the layout.
         factor: What all of it is multiplied by, over 0, at most 1.
-        frequency: Of control steps (Hz).
 
     Raises:
-        MotionError: If the factor or the frequency is invalid.
+        MotionError: If the factor is invalid.
         UnknownNameError: If there is no such arm or control mode.
     """
     factor = checked_number("velocity", factor, 1e-3, 1.0, MotionError)
-    frequency = checked_number("frequency", frequency, 1e-3, 1e6, MotionError, "Hz")
     driven = layout.in_control_mode(layout.control_mode(control_mode))
     found: dict[str, Floats] = {}
     for name, placement in layout.items():
         robot = placement.robot
-        found[name] = factor * np.minimum(
-            _urdf_speeds(robot), _driven_speeds(driven[name].robot, frequency)
-        )
+        found[name] = factor * np.minimum(_urdf_speeds(robot), _driven_speeds(driven[name].robot))
         slow = found[name] <= 0
         found[name][slow] = factor * _default_speeds(robot)[slow]
     return found
@@ -113,7 +105,7 @@ def timed(path: Path, accelerations: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the fastest way along a path: times, positions and velocities of dense knots.
 
     It begins and ends at rest, and rests at points without a blend. Speeds are toppra's, or where
-    that is not installed, those of `robot_layouts.motion.timing.sweeps`.
+    that is not installed, those of `robot_layouts.motion.timing.velocities`.
 
     Args:
         path: With the largest speeds.
@@ -140,40 +132,33 @@ def timed(path: Path, accelerations: Floats) -> tuple[Floats, Floats, Floats]:
 
 def _profile(run: Path, accelerations: Floats) -> tuple[Floats, Floats]:
     """Return parameters along a path without stops, and the speed at each."""
+    fastest = _fastest_by_toppra
     try:
         import_toppra()
     except MissingPackageError:
-        return _swept(run, accelerations)
-    from toppra.algorithm import TOPPRA
-    from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
-
-    speeds, limits = _MARGIN * run.speeds, _MARGIN * accelerations
+        fastest = fastest_speeds
     for refined in (1, 2, 4):
         grid = run.grid(10 * refined, 0.05 / refined)
-        constraints = [
-            JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
-            JointAccelerationConstraint(np.stack([-limits, limits], axis=1)),
-        ]
-        with _quiet():
-            found: Any = TOPPRA(
-                constraints, _geometric(run), gridpoints=grid, solver_wrapper="seidel"
-            ).compute_parameterization(0.0, 0.0)
-        speed = found[1]
+        speed = fastest(run, grid, _MARGIN * run.speeds, _MARGIN * accelerations)
         if speed is not None and np.isfinite(speed).all() and (speed[1:-1] > 0).all():
             return grid, np.asarray(speed, float)
     return _stopping(run, accelerations)
 
 
-def _swept(run: Path, accelerations: Floats) -> tuple[Floats, Floats]:
-    """Return the profile where toppra is not installed."""
-    for refined in (1, 2, 4):
-        grid = run.grid(10 * refined, 0.05 / refined)
-        speed = fastest_speeds(
-            grid, run.at(grid, 1), run.at(grid, 2), _MARGIN * run.speeds, _MARGIN * accelerations
-        )
-        if (speed[1:-1] > 0).all():
-            return grid, speed
-    return _stopping(run, accelerations)
+def _fastest_by_toppra(run: Path, grid: Floats, speeds: Floats, limits: Floats) -> Any:
+    """Return what `fastest_speeds` does, or None if there are none."""
+    from toppra.algorithm import TOPPRA
+    from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
+
+    constraints = [
+        JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
+        JointAccelerationConstraint(np.stack([-limits, limits], axis=1)),
+    ]
+    with _quiet():
+        found: Any = TOPPRA(
+            constraints, _geometric(run), gridpoints=grid, solver_wrapper="seidel"
+        ).compute_parameterization(0.0, 0.0)
+    return found[1]
 
 
 def _stopping(run: Path, accelerations: Floats) -> tuple[Floats, Floats]:
@@ -217,18 +202,14 @@ def _knots(run: Path, grid: Floats, speed: Floats) -> tuple[Floats, Floats, Floa
     return times, positions, run.at(at, 1) * rate[:, None]
 
 
-def _driven_speeds(robot: RobotDescriptor, frequency: float) -> Floats:
+def _driven_speeds(robot: RobotDescriptor) -> Floats:
     """Return what the control mode can ask of each joint, (dof,); infinite if it does not limit."""
     return np.array(
-        [
-            speed
-            for group in robot.action_split.groups.values()
-            for speed in _group_speeds(group, frequency)
-        ]
+        [speed for group in robot.action_split.groups.values() for speed in _group_speeds(group)]
     )
 
 
-def _group_speeds(group: JointGroup, frequency: float) -> list[float]:
+def _group_speeds(group: JointGroup) -> list[float]:
     count = len(group.joints)
     reaches = [min(abs(low), abs(high)) for low, high in group.ranges]
     if group.held or group.asks.tcp or group.asks.drive:
@@ -237,39 +218,28 @@ def _group_speeds(group: JointGroup, frequency: float) -> list[float]:
         if not group.delta:
             return [np.inf] * count
         reaches = reaches * count if group.mimic else reaches
-        shares = [1.0] * count if group.target else _followed_shares(group, frequency)
-        return [
-            share * reach * frequency for share, reach in zip(shares, reaches[:count], strict=True)
-        ]
+        shares = [1.0] * count if group.target else _followed_shares(group)
+        ways = zip(shares, reaches[:count], strict=True)
+        return [share * reach * CONTROL_FREQUENCY for share, reach in ways]
     return reaches[-count:]
 
 
-def _followed_shares(group: JointGroup, frequency: float) -> list[float]:
+def _followed_shares(group: JointGroup) -> list[float]:
     """Return the share of the way to its target that each joint's drive goes in a control step."""
+    frequency = CONTROL_FREQUENCY
     return [1 - math.exp(-k / (d * frequency)) if d else 1.0 for k, d, _ in group.drives]
 
 
-@lru_cache(maxsize=64)
-def _file_speeds(urdf: FilePath, _stamp: int) -> Mapping[str, float]:
-    model = read_model(read_urdf(urdf), str(urdf))
-    return {
-        joint.name: joint.velocity
-        for joint in model.moving
-        if joint.velocity is not None and joint.velocity > 0
-    }
-
-
 def _urdf_speeds(robot: RobotDescriptor) -> Floats:
-    urdf = robot.urdf.locate()
-    known = _file_speeds(urdf, urdf.stat().st_mtime_ns)
+    moving = model_of(robot.urdf.locate()).moving
+    known = {joint.name: joint.velocity for joint in moving if (joint.velocity or 0) > 0}
     defaults = _default_speeds(robot)
-    return np.array([known.get(j, defaults[i]) for i, j in enumerate(robot.joints)])
+    return np.array([known.get(j, defaults[i]) for i, j in enumerate(robot.joints)], float)
 
 
 def _default_speeds(robot: RobotDescriptor) -> Floats:
-    return np.array(
-        [FASTEST.get(g.unit, 2.0) for g in robot.action_split.groups.values() for _ in g.joints]
-    )
+    groups = robot.action_split.groups.values()
+    return np.array([FASTEST[group.unit] for group in groups for _ in group.joints])
 
 
 def import_toppra() -> None:
@@ -278,13 +248,8 @@ def import_toppra() -> None:
     Raises:
         MissingPackageError: If it is not installed.
     """
-    try:
-        with _quiet():
-            import toppra  # noqa: F401  # pyright: ignore[reportUnusedImport]
-    except ImportError as error:
-        raise MissingPackageError(
-            "timing a motion needs toppra: pip install 'robot-layouts[motion]'"
-        ) from error
+    with _quiet():
+        optional("toppra", "timing a motion needs toppra", "motion")
 
 
 @contextmanager
@@ -321,3 +286,75 @@ def _geometric(path: Path) -> Any:
             return None
 
     return Geometric()
+
+
+_FLAT = 1e-9  # slopes of coordinates that hardly move (s, as paths are measured)
+_FAST = 1e6  # squared speed that no limit bounds
+
+
+class _Lines(NamedTuple):
+    """Bounds of u at each point: at most ``a - b x``, at least ``-a - b x``, and x at most."""
+
+    a: Floats
+    b: Floats
+    fastest: Floats
+
+
+def fastest_speeds(path: Path, grid: Floats, speeds: Floats, accelerations: Floats) -> Floats:
+    """Return the largest speed of the parameter at each point, from rest to rest, (m,).
+
+    As toppra does, for where it is not. TOPP-RA (Pham and Pham, 2018) keeps of each point of the
+    path the squared speeds from which its end can still be reached, from the end to the start, and
+    then goes as fast as these allow. In squares of the speed x and accelerations u of the
+    parameter, all limits are lines: A - B x at most, or C - D x at least, for u. At rest nothing is
+    asked for, so that all begin at x = 0.
+
+    Args:
+        path: Without stops.
+        grid: Parameters, (m,).
+        speeds: Largest of each coordinate, (coordinates,) (rad/s, m/s).
+        accelerations: Likewise (rad/s², m/s²).
+    """
+    steps = np.diff(grid)
+    lines = _limits(steps, path.at(grid, 1), path.at(grid, 2), speeds, accelerations)
+    reachable = np.zeros(len(grid))
+    for i in reversed(range(len(steps))):
+        reachable[i] = _largest(lines, i, steps[i], reachable[i + 1])
+    squares = np.zeros(len(grid))
+    for i, step in enumerate(steps):
+        most = (lines.a[i] - lines.b[i] * squares[i]).min(initial=_FAST)
+        squares[i + 1] = np.clip(squares[i] + 2 * step * most, 0.0, reachable[i + 1])
+    return np.sqrt(squares)
+
+
+def _limits(
+    steps: Floats, slopes: Floats, bends: Floats, speeds: Floats, accelerations: Floats
+) -> _Lines:
+    """Return the limits of each step: of accelerations where it begins, and where it ends."""
+    # Where it ends, x is x + 2 step u, which adds to what multiplies u.
+    behind = slopes[1:] + 2 * steps[:, None] * bends[1:]
+    moved = np.concatenate([slopes[:-1], behind], axis=1)
+    turned = np.concatenate([bends[:-1], bends[1:]], axis=1)
+    limit = np.tile(accelerations, 2)
+    flat = np.abs(moved) < _FLAT
+    scale = np.where(flat, 1.0, moved)
+    with np.errstate(divide="ignore"):
+        by_turning = np.where(flat & (turned != 0), limit / np.abs(turned), np.inf).min(axis=1)
+        by_speed = (speeds / np.abs(slopes[:-1])).min(axis=1) ** 2
+    return _Lines(
+        np.where(flat, _FAST, limit / np.abs(scale)),
+        np.where(flat, 0.0, turned / scale),
+        np.minimum(np.minimum(by_turning, by_speed), _FAST),
+    )
+
+
+def _largest(lines: _Lines, i: int, step: float, behind: float) -> float:
+    """Return the largest x of a point from which some u leads to between 0 and ``behind``."""
+    onward = 1 / (2 * step)
+    above = np.append(lines.a[i], behind * onward), np.append(lines.b[i], onward)
+    below = np.append(-lines.a[i], 0.0), np.append(lines.b[i], onward)
+    room = above[0][:, None] - below[0]
+    faster = above[1][:, None] - below[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.where(faster > 0, room / faster, np.inf)
+    return float(min(ends.min(), lines.fastest[i]))

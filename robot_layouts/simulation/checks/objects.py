@@ -26,6 +26,7 @@ from robot_layouts.kinematics.rotations import (
     quaternion_of,
     rotate,
 )
+from robot_layouts.simulation.checks.overlaps import stand
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
 from robot_layouts.simulation.simulation import Simulation
 from robot_layouts.simulation.tabletop import add_table
@@ -263,9 +264,7 @@ def _stood(
     physics = _WEIGHTLESS if weightless else SAPIEN_DEFAULTS
     frequency = _FREQUENCY if weightless else 20.0
     simulation = Simulation(layout, build, count, physics, control_frequency=frequency)
-    simulation.clear(range(count))
-    for world in simulation.worlds:
-        world.stand(HAND, layout[HAND].start_qpos)
+    stand(simulation)
     simulation.rest(simulation.read(), range(count))
     return simulation
 

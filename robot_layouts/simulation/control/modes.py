@@ -16,7 +16,7 @@ from robot_layouts.simulation.control.joint_positions import (
     driven_groups,
 )
 from robot_layouts.simulation.control.tcp import TcpController
-from robot_layouts.simulation.maths import Floats, cos, sin
+from robot_layouts.simulation.maths import Floats, cos, maximum, minimum, sin, zeros
 from robot_layouts.simulation.readout import ReadoutIndex
 from robot_layouts.simulation.state import State
 
@@ -125,16 +125,7 @@ class ModeController:
                 control.drive(action[env], scaled[env], state, env, targets[env])
         if self._any_target:
             self.targets[env_ids] = targets[env_ids]
-        if not self.moves:
-            return targets, None
-        velocities = np.zeros_like(targets)
-        velocities[:, self._velocity_joints] = scaled[:, self._velocity_numbers]
-        for joint, number in self._bases:
-            heading, forward = present[:, joint + 2], scaled[:, number]
-            velocities[:, joint] = cos(heading) * forward
-            velocities[:, joint + 1] = sin(heading) * forward
-            velocities[:, joint + 2] = scaled[:, number + 1]
-        return targets, velocities
+        return targets, self._velocities(present, scaled) if self.moves else None
 
     @property
     def shortfalls(self) -> dict[str, Floats]:
@@ -166,7 +157,18 @@ class ModeController:
 
     def _scaled(self, action: Floats) -> Floats:
         low, high, centre, half = self._scale
-        return centre + half * np.minimum(np.maximum(action, low), high)
+        return centre + half * minimum(maximum(action, low), high)
+
+    def _velocities(self, present: Floats, scaled: Floats) -> Floats:
+        """Return the velocities that scaled action numbers ask of all joints, else 0."""
+        velocities = zeros(present)
+        velocities[:, self._velocity_joints] = scaled[:, self._velocity_numbers]
+        for joint, number in self._bases:
+            heading, forward = present[:, joint + 2], scaled[:, number]
+            velocities[:, joint] = cos(heading) * forward
+            velocities[:, joint + 1] = sin(heading) * forward
+            velocities[:, joint + 2] = scaled[:, number + 1]
+        return velocities
 
     def _rows(self, part: DrivenGroup) -> Floats:
         """Return a view of what is remembered of a joint group."""

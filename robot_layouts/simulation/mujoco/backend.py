@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from robot_layouts.simulation.backend import (
     Built,
+    EachWorld,
     Overlap,
     Pair,
     Part,
-    PointSolver,
     PoseFollower,
-    PoseSolver,
     Readout,
     Rows,
     Velocity,
+    arms_of,
 )
+from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
+from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.mujoco.contacts import (
     ArmWatcher,
     ForceReader,
@@ -30,29 +34,21 @@ from robot_layouts.simulation.mujoco.contacts import (
     presses_on_object,
 )
 from robot_layouts.simulation.mujoco.drives import JointDrives
-from robot_layouts.simulation.mujoco.extents import extent_of
-from robot_layouts.simulation.mujoco.library import mujoco
 from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, substeps_of
 from robot_layouts.simulation.mujoco.pictures import Pictures
-from robot_layouts.simulation.mujoco.threads import Threads
-from robot_layouts.simulation.mujoco.world import MujocoWorld
+from robot_layouts.simulation.mujoco.world import MujocoWorld, extent_of
 from robot_layouts.simulation.physics import PhysicsSettings
-from robot_layouts.simulation.scene.cameras import AnyCamera, View
-from robot_layouts.simulation.scene.variation import Variation
 from robot_layouts.simulation.solvers import (
-    InverseKinematics,
-    PointReach,
     TreeArm,
     TreeFollower,
 )
-from robot_layouts.simulation.world import Placements, World, WorldBody
-from robots import SimulationError
+from robot_layouts.simulation.world import World, WorldBody
 
 # What does not fit is seen in the state, which is no number then; MuJoCo would write a file of it.
 mujoco.set_mju_user_warning(lambda message: None)
 
 
-class MujocoBackend:
+class MujocoBackend(EachWorld):
     """N worlds of one layout, each with a state of its own; alike ones share a model.
 
     A clone of a task of ManiSkill's is the same task here, with other physics.
@@ -61,11 +57,12 @@ class MujocoBackend:
         worlds: The worlds.
     """
 
+    worlds: list[MujocoWorld]
+
     def __init__(self) -> None:
         """Begin without worlds."""
-        self.worlds: list[MujocoWorld] = []
+        super().__init__()
         self._robots: RobotModels | None = None
-        self._arms: list[ArmWatcher] | None = None
         self._threads = Threads()
         self._pictures = Pictures()
 
@@ -84,37 +81,13 @@ class MujocoBackend:
                 self._index = Inventory(models[alike], world, robots.cell)
             inner = substeps_of(world.physics.timestep, robots.timestep)
             built[number] = MujocoWorld(world, models[alike], self._index, inner)
-        self.worlds = [
-            built.get(i) or self.worlds[i] for i in range(max(len(self.worlds), len(built)))
-        ]
+        self._keep(built)
         self._pictures.keep(self.worlds)
         self._drives = JointDrives(self.worlds, first.layout, self._index)
         self._forces: dict[tuple[Pair, ...], ForceReader] = {}
-        if self._arms is not None:
+        if self._watchers is not None:
             self.watch_arms()
         return self._index.built
-
-    def clear(self, env_ids: Sequence[int]) -> None:
-        """Begin a reset; see `Backend`."""
-        for i in env_ids:
-            self.worlds[i].clear()
-
-    def vary(self, variations: Mapping[int, Variation]) -> None:
-        """Let worlds differ from what was built; see `Backend`."""
-        for i, variation in variations.items():
-            self.worlds[i].vary(variation)
-
-    def place(self, placements: Placements) -> None:
-        """Stand robots and move bodies; see `Backend`."""
-        for name, rows in placements.robots.items():
-            for i, qpos in rows.items():
-                self.worlds[i].stand(name, qpos)
-        for name, rows in placements.bodies.items():
-            for i, pose in rows.items():
-                self.worlds[i].place(name, pose)
-        for name, rows in placements.joints.items():
-            for i, positions in rows.items():
-                self.worlds[i].set_joints(name, positions)
 
     def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
         """Set drive targets; see `Backend`."""
@@ -195,14 +168,6 @@ class MujocoBackend:
         """Return what segmentation's numbers stand for; see `Backend`."""
         return dict(self._index.parts)
 
-    def inverse_kinematics(self, robot: str) -> PoseSolver:
-        """Return a solver for poses; see `Backend`."""
-        return InverseKinematics(self._arm(robot))
-
-    def point_reach(self, robot: str) -> PointSolver:
-        """Return a solver for points; see `Backend`."""
-        return PointReach(self._arm(robot))
-
     def pose_follower(
         self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
     ) -> PoseFollower:
@@ -222,15 +187,10 @@ class MujocoBackend:
         """Look at which arms touch from now on; see `Backend`."""
         assert self._robots is not None
         models = {name: s.source.model for name, s in self._robots.cell.robots.items()}
-        self._arms = [ArmWatcher(world, models) for world in self.worlds]
-        for world, arms in zip(self.worlds, self._arms, strict=True):
-            world.after_each = arms.look
-
-    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
-        """Return which links of different arms touched since it was last asked; see `Backend`."""
-        if self._arms is None:
-            raise SimulationError("contacts between arms are not watched; call watch_arms() first")
-        return self._arms[env].take()
+        known, arms = self._watchers or {}, arms_of(self.worlds[0].declared.layout, models)
+        self._watchers = {w: known.get(w) or ArmWatcher(w, arms) for w in self.worlds}
+        for world, watcher in self._watchers.items():
+            world.after_each = watcher.look
 
     def touching(self) -> Flags:
         """Tell where a link pressed on a dynamic body; see `Backend`."""
@@ -270,3 +230,24 @@ class MujocoBackend:
         (first, *_), layout = self.worlds, self.worlds[0].declared.layout
         owner = layout.owner(robot)
         return TreeArm(layout, robot, first.base_of(owner))
+
+
+class Threads:
+    """As many threads as torch may use in this process; those of a fork are its own."""
+
+    def __init__(self) -> None:
+        """Begin without threads."""
+        self._pool: ThreadPoolExecutor | None = None
+        self._made_for = (0, 0)
+
+    def run(self, works: Sequence[Callable[[], None]]) -> None:
+        """Do all of it, and return when all is done."""
+        count = torch.get_num_threads()
+        if count < 2 or len(works) < 2:
+            for work in works:
+                work()
+            return
+        if self._pool is None or self._made_for != (os.getpid(), count):
+            self._pool, self._made_for = ThreadPoolExecutor(count), (os.getpid(), count)
+        for _ in self._pool.map(lambda work: work(), works):
+            pass

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.simulation.backend import Overlap, Pair, Part
 from robot_layouts.simulation.maths import Floats
-from robot_layouts.simulation.mujoco.library import mujoco
+from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.mujoco.world import MujocoWorld
-from robots.urdf.model import UrdfModel
 
 
 class ForceReader:
@@ -98,18 +97,17 @@ def overlaps_in(world: MujocoWorld) -> list[Overlap]:
 
 
 class ArmWatcher:
-    """Looks after each of MuJoCo's steps at which links of different arms touch."""
+    """Looks after each of MuJoCo's steps at which links of different arms touch.
 
-    def __init__(self, world: MujocoWorld, models: dict[str, UrdfModel]) -> None:
-        """Look up whose each link is."""
-        self._world = world
-        self._arms = {
-            number: arm
-            for number, part in world.index.parts.items()
-            if part.robot is not None
-            and (arm := _arm_of(world, part, models[part.robot])) is not None
-        }
-        self._seen: dict[tuple[Part, Part], None] = {}
+    Attributes:
+        seen: Which did.
+    """
+
+    def __init__(self, world: MujocoWorld, arms: Mapping[Part, tuple[str, str]]) -> None:
+        """Take the arm of each link."""
+        self._world, parts = world, world.index.parts
+        self._arms = {number: arms[part] for number, part in parts.items() if part in arms}
+        self.seen: dict[tuple[Part, Part], None] = {}
 
     def look(self) -> None:
         """Remember what touches now."""
@@ -117,20 +115,4 @@ class ArmWatcher:
         for _, (first, second) in _touching(world):
             one, other = self._arms.get(first), self._arms.get(second)
             if one and other and one != other:
-                self._seen[world.index.parts[first], world.index.parts[second]] = None
-
-    def take(self) -> list[tuple[Part, Part]]:
-        """Return what touched since it was last asked."""
-        seen, self._seen = list(self._seen), {}
-        return seen
-
-
-def _arm_of(world: MujocoWorld, part: Part, model: UrdfModel) -> tuple[str, str] | None:
-    """Return the robot and the limb of the last joint on the way to a link; None if of no limb."""
-    assert part.robot is not None
-    descriptor = world.declared.layout[part.robot].robot
-    if not descriptor.limbs:
-        return part.robot, ""
-    limbs = {joint: limb for limb in descriptor.limbs for joint in descriptor.parts[limb].joints}
-    last = [limbs[joint.name] for joint in model.path_to(part.name) if joint.name in limbs]
-    return (part.robot, last[-1]) if last else None
+                self.seen[world.index.parts[first], world.index.parts[second]] = None

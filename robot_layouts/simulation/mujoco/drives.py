@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from layouts import Layout
-from robot_layouts.simulation.linkage import Leaders
+from robot_layouts.simulation.control.joint_positions import Leaders
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.mujoco.model import Inventory
 from robot_layouts.simulation.mujoco.world import MujocoWorld
@@ -15,7 +15,7 @@ from robots import JointGroup
 
 
 class LedGroup:
-    """The drives of a joint group with leaders; see `robot_layouts.simulation.linkage`.
+    """The drives of a joint group with leaders; see `Leaders`.
 
     Attributes:
         group: The group.

@@ -12,10 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
-from robot_layouts.simulation.mujoco.library import mujoco
-from robot_layouts.simulation.mujoco.visuals import DRAWN, MARKERS
-from robot_layouts.simulation.mujoco.world import MujocoWorld
-from robot_layouts.simulation.scene.cameras import (
+from robot_layouts.simulation.cameras import (
     AnyCamera,
     RobotCamera,
     View,
@@ -23,6 +20,9 @@ from robot_layouts.simulation.scene.cameras import (
     lens_of,
     ridden,
 )
+from robot_layouts.simulation.mujoco import mujoco
+from robot_layouts.simulation.mujoco.bodies import DRAWN, MARKERS
+from robot_layouts.simulation.mujoco.world import MujocoWorld
 from robots import SimulationError
 
 _OFFERED = ("rgb", "depth", "segmentation", "position")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -82,31 +83,11 @@ class DeviceState(State):
         turns: Any = self.quaternion(body)
         return rotation_matrix(turns)
 
-    @remembered
-    def last_euler_angle(self, body: str) -> Any:
-        """Angle about z of a body turned about its own x, then y, then z, shape (N,) (rad)."""
-        turn = self.rotation(body)
-        return torch.atan2(-turn[:, 0, 1], turn[:, 0, 0])
-
     def native_joints(self, robot: str) -> list[Any]:
         """Joint positions and velocities of a robot in native's order, which is SAPIEN's."""
         rows: list[Any] = [self.qpos(robot), self.qvel(robot)]
         order = self._index.native[robot]
         return rows if order is None else [row[:, order] for row in rows]
-
-    @remembered
-    def gripper_opening(self, robot: str) -> Any:
-        """How far a robot's gripper is open, shape (N,): 0 closed, 1 wide open, 1 without one."""
-        gripper = self._index.grippers[robot]
-        if gripper is None:
-            return self.full(1.0)
-        joints, widest = gripper
-        return self.joint_positions[:, joints].sum(1) / float(widest)
-
-    @remembered
-    def is_static(self, robot: str, threshold: float = 0.2) -> Any:
-        """Whether no arm joint is faster than ``threshold`` (rad/s), shape (N,) bool."""
-        return (abs(self.arm_qvel(robot)) <= threshold).all(1)
 
     @remembered
     def is_grasping(self, robot: str, body: str, max_angle: float | None = None) -> Any:
@@ -167,3 +148,19 @@ def _between(poses: Any, mean: MeanFrame) -> Tensor:
     if any(offset):
         place = place + rotation_matrix(turn) @ like(turn, offset)
     return torch.cat((place, turn), 1)
+
+
+def move_arrays(holder: object, device: torch.device) -> None:
+    """Let the NumPy arrays that an object holds be tensors of a device."""
+    vars(holder).update(
+        {
+            name: torch.from_numpy(np.ascontiguousarray(array)).to(device)
+            for name, array in vars(holder).items()
+            if isinstance(array, np.ndarray)
+        }
+    )
+
+
+def beside(flags: Tensor, rows: Tensor) -> Tensor:
+    """Return flags, (N,), in as many axes as rows have, (N, …)."""
+    return flags.view(-1, *[1] * (rows.ndim - 1))

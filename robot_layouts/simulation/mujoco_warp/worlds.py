@@ -13,12 +13,15 @@ import torch
 from torch import Tensor
 
 from robot_layouts.simulation.backend import Pair, Readout, Velocity
-from robot_layouts.simulation.mujoco.library import mujoco
+from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.mujoco.world import MujocoWorld
-from robot_layouts.simulation.mujoco_warp.arrays import beside
-from robot_layouts.simulation.mujoco_warp.contacts import ContactForces
-from robot_layouts.simulation.mujoco_warp.library import mujoco_warp, warp
-from robot_layouts.simulation.mujoco_warp.linkages import LinkageDrives
+from robot_layouts.simulation.mujoco_warp.kernels import (
+    ContactForces,
+    LinkageDrives,
+    mujoco_warp,
+    warp,
+)
+from robot_layouts.simulation.mujoco_warp.state import beside
 from robots import SimulationError
 
 # Room for contacts in each world: as many as at its start, as many as hands add, and as many again.

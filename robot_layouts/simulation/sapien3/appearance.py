@@ -26,8 +26,8 @@ from sapien.render import (
 from objects.shapes import Shape
 from robot_layouts.simulation.sapien3.visuals import drawn_shapes, stretch
 from robot_layouts.simulation.sapien3.world import BuiltWorld
-from robot_layouts.simulation.scene.looks import CameraOffset, Glow, Looks, Paint, Pattern
-from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.variation import CameraOffset, Glow, Looks, Paint, Pattern
+from robot_layouts.simulation.world import Part
 from robots.descriptor import Vector3
 
 _MOST_TILT = 1.4  # rad from the vertical; light from the horizon and below lights no table

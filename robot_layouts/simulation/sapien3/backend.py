@@ -11,18 +11,20 @@ from numpy.typing import NDArray
 from robot_layouts.simulation.backend import (
     Built,
     BuiltRobot,
+    EachWorld,
     Overlap,
     Pair,
     Part,
     Readout,
     Rows,
     Velocity,
+    arms_of,
 )
+from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
-from robot_layouts.simulation.sapien3.arms import SapienArm
+from robot_layouts.simulation.sapien3.arms import PinocchioFollower, SapienArm
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
-from robot_layouts.simulation.sapien3.bodies import JointedBody
-from robot_layouts.simulation.sapien3.collision import described_shapes
+from robot_layouts.simulation.sapien3.bodies import described_shapes
 from robot_layouts.simulation.sapien3.contacts import (
     ArmContacts,
     PairForces,
@@ -32,36 +34,31 @@ from robot_layouts.simulation.sapien3.contacts import (
     presses_on_object,
 )
 from robot_layouts.simulation.sapien3.device import describe_graphics
-from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
-from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world, vary
-from robot_layouts.simulation.scene.cameras import AnyCamera, View
-from robot_layouts.simulation.scene.variation import Variation
-from robot_layouts.simulation.solvers import InverseKinematics, PointReach
-from robot_layouts.simulation.world import Placements, World
-from robots import RobotDescriptor, SimulationError
+from robot_layouts.simulation.sapien3.world import BuiltWorld, build_world
+from robot_layouts.simulation.world import World
+from robots import RobotDescriptor
 
 _STILL = np.zeros(3, np.float32)
 
 
-class SapienBackend:
+class SapienBackend(EachWorld):
     """N worlds of one layout, each a scene of its own.
 
     Attributes:
         worlds: The worlds.
     """
 
+    worlds: list[BuiltWorld]
+
     def __init__(self) -> None:
         """Begin without worlds."""
-        self.worlds: list[BuiltWorld] = []
+        super().__init__()
         self._blueprints: dict[RobotDescriptor, Blueprint] = {}
-        self._arms: dict[BuiltWorld, ArmContacts] | None = None
 
     def build(self, worlds: Mapping[int, World]) -> Built:
         """Build worlds; see `Backend`."""
         built = {i: build_world(world, self._blueprints) for i, world in worlds.items()}
-        self.worlds = [
-            built.get(i) or self.worlds[i] for i in range(max(len(self.worlds), len(built)))
-        ]
+        self._keep(built)
         robots = [robot for world in self.worlds for robot in world.robots.values()]
         self._articulations: list[Any] = [robot.articulation for robot in robots]
         self._setters: list[list[Callable[[float], None]]] = [
@@ -78,35 +75,13 @@ class SapienBackend:
         ]
         self._packers = [world.scene.pack_poses for world in self.worlds]
         self._steps = [world.stepper() for world in self.worlds]
-        if self._arms is not None:
+        if self._watchers is not None:
             self.watch_arms()
         self._places = _pose_places(len(self.worlds), len(self.worlds[0].scene.entities))
         self._order = _declared_order(self.worlds[0])
         self._forces: dict[tuple[Pair, ...], PairForces] = {}
         self._movers: dict[tuple[Velocity, ...], list[tuple[Any, str]]] = {}
         return _inventory(self.worlds[0])
-
-    def clear(self, env_ids: Sequence[int]) -> None:
-        """Begin a reset; see `Backend`."""
-        for i in env_ids:
-            self.worlds[i].clear()
-
-    def vary(self, variations: Mapping[int, Variation]) -> None:
-        """Let worlds differ from what was built; see `Backend`."""
-        for i, variation in variations.items():
-            vary(self.worlds[i], variation)
-
-    def place(self, placements: Placements) -> None:
-        """Stand robots and move bodies; see `Backend`."""
-        for name, rows in placements.robots.items():
-            for i, qpos in rows.items():
-                self.worlds[i].robots[name].reset(qpos)
-        for name, rows in placements.bodies.items():
-            for i, pose in rows.items():
-                self.worlds[i].place(name, pose)
-        for name, rows in placements.joints.items():
-            for i, positions in rows.items():
-                self._jointed(i, name).set_joints(positions)
 
     def drive(self, targets: Floats, env_ids: Sequence[int]) -> None:
         """Set drive targets; see `Backend`."""
@@ -153,7 +128,7 @@ class SapienBackend:
 
     def body_joints(self, body: str) -> Floats:
         """Return joints of a body; see `Backend`."""
-        return np.stack([self._jointed(i, body).joints for i in range(len(self.worlds))])
+        return np.stack([world.jointed(body).joints for world in self.worlds])
 
     def forces(self, pairs: tuple[Pair, ...]) -> Floats | None:
         """Return contact forces of pairs; see `Backend`."""
@@ -191,14 +166,6 @@ class SapienBackend:
             component.entity.per_scene_id: part for part, component in components_of(self.worlds[0])
         }
 
-    def inverse_kinematics(self, robot: str) -> InverseKinematics:
-        """Return a solver for poses; see `Backend`."""
-        return InverseKinematics(SapienArm(self.worlds[0], robot))
-
-    def point_reach(self, robot: str) -> PointReach:
-        """Return a solver for points; see `Backend`."""
-        return PointReach(SapienArm(self.worlds[0], robot))
-
     def pose_follower(
         self, robot: str, link: str, root_link: str | None, joints: Sequence[str]
     ) -> PinocchioFollower:
@@ -217,15 +184,11 @@ class SapienBackend:
 
     def watch_arms(self) -> None:
         """Look at which arms touch from now on; see `Backend`."""
-        known = self._arms or {}
-        self._arms = {w: known.get(w) or ArmContacts(w) for w in self.worlds}
-        self._steps = [arms.step for arms in self._arms.values()]
-
-    def arms_touching(self, env: int) -> list[tuple[Part, Part]]:
-        """Return which links of different arms touched since it was last asked; see `Backend`."""
-        if self._arms is None:
-            raise SimulationError("contacts between arms are not watched; call watch_arms() first")
-        return self._arms[self.worlds[env]].take()
+        known, layout = self._watchers or {}, self.worlds[0].layout
+        models = {name: self._blueprints[own.robot].model for name, own in layout.items()}
+        arms = arms_of(layout, models)
+        self._watchers = {w: known.get(w) or ArmContacts(w, arms) for w in self.worlds}
+        self._steps = [watcher.step for watcher in self._watchers.values()]
 
     def touching(self) -> Flags:
         """Tell where a link pressed on a dynamic body; see `Backend`."""
@@ -245,10 +208,8 @@ class SapienBackend:
             return joints[0][None]
         return np.concatenate(joints).reshape(len(self.worlds), -1)
 
-    def _jointed(self, env: int, name: str) -> JointedBody:
-        body = self.worlds[env].bodies[name]
-        assert isinstance(body, JointedBody)
-        return body
+    def _arm(self, robot: str) -> SapienArm:
+        return SapienArm(self.worlds[0], robot)
 
     def _find_movers(self, wanted: tuple[Velocity, ...]) -> list[tuple[Any, str]]:
         return [

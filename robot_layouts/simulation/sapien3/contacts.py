@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from operator import add
 from typing import Any
@@ -12,7 +12,6 @@ import sapien.physx as physx
 
 from robot_layouts.simulation.backend import Overlap, Pair, Part
 from robot_layouts.simulation.maths import Floats
-from robot_layouts.simulation.sapien3.robot import SimulatedRobot
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 
 _Table = dict[tuple[int, int], tuple[int, int]]
@@ -91,17 +90,19 @@ def _impulses(contacts: Sequence[Any], table: _Table, alone: _Alone) -> dict[int
 
 
 class ArmContacts:
-    """Steps the physics of a world and remembers which links of different arms touch."""
+    """Steps the physics of a world and remembers which links of different arms touch.
 
-    def __init__(self, world: BuiltWorld) -> None:
-        """Look up whose each link is."""
+    Attributes:
+        seen: Which did.
+    """
+
+    def __init__(self, world: BuiltWorld, arms: Mapping[Part, tuple[str, str]]) -> None:
+        """Take the arm of each link."""
         self._advance, self._contacts = world.stepper(), world.system.get_contacts
         self._links = {
-            id(link): (arm, Part(robot.name, link.name))
-            for robot in world.robots.values()
-            for arm, link in _links_of_arms(robot)
+            id(link): (arms[part], part) for part, link in components_of(world) if part in arms
         }
-        self._seen: dict[tuple[Part, Part], None] = {}
+        self.seen: dict[tuple[Part, Part], None] = {}
 
     def step(self) -> None:
         """Advance by one step of physics."""
@@ -110,36 +111,12 @@ class ArmContacts:
         for contact in self._contacts():
             one, other = (links.get(id(body)) for body in contact.bodies)
             if one and other and one[0] != other[0] and _touch(contact):
-                self._seen[one[1], other[1]] = None
-
-    def take(self) -> list[tuple[Part, Part]]:
-        """Return what touched since it was last asked."""
-        seen, self._seen = list(self._seen), {}
-        return seen
+                self.seen[one[1], other[1]] = None
 
 
 def _touch(contact: Any) -> bool:
     """Tell whether two bodies that are near each other touch."""
     return any(point.separation <= 0 or np.any(point.impulse) for point in contact.points)
-
-
-def _links_of_arms(robot: SimulatedRobot) -> Iterator[tuple[tuple[str, str], Any]]:
-    """Yield the links of a robot, each with its arm: the robot and, if it has limbs, the limb.
-
-    A link is of the limb that has the last joint on the way to it; what is of no limb is left out
-    if there are limbs.
-    """
-    descriptor = robot.descriptor
-    if not descriptor.limbs:
-        yield from (((robot.name, ""), link) for link in robot.links.values())
-        return
-    limbs = {joint: part for part in descriptor.limbs for joint in descriptor.parts[part].joints}
-    for link in robot.links.values():
-        at = link
-        while at is not None and (at.joint is None or at.joint.name not in limbs):
-            at = at.parent
-        if at is not None:
-            yield (robot.name, limbs[at.joint.name]), link
 
 
 def overlaps_in(world: BuiltWorld) -> list[Overlap]:

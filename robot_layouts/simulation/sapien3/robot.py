@@ -10,14 +10,13 @@ import numpy as np
 import sapien
 
 from layouts import Placement
-from robot_layouts.simulation.linkage import Leaders
+from robot_layouts.simulation.control.joint_positions import Leaders, joint_speeds
 from robot_layouts.simulation.sapien3.blueprint import Blueprint
-from robot_layouts.simulation.speeds import joint_speeds
 from robots import DescriptorError, JointGroup, RobotDescriptor, UnknownNameError
 
 
 class DrivenLinkage:
-    """The drives of a joint group with leaders; see `robot_layouts.simulation.linkage`."""
+    """The drives of a joint group with leaders; see `Leaders`."""
 
     def __init__(self, group: JointGroup, joints: Sequence[Any], articulation: Any) -> None:
         """Take a group, its joints as SAPIEN has them, and what they are joints of."""

@@ -12,6 +12,19 @@ import sapien
 import torch
 from numpy.typing import NDArray
 
+from robot_layouts.simulation.cameras import (
+    RAW_IMAGES,
+    RAY_TRACING,
+    AnyCamera,
+    RobotCamera,
+    View,
+    camera_name,
+    field_of_view,
+    lens_of,
+    ridden,
+    shaders_of,
+    told_by,
+)
 from robot_layouts.simulation.rotations import quaternion
 from robot_layouts.simulation.sapien3.appearance import (
     Appearance,
@@ -30,20 +43,7 @@ from robot_layouts.simulation.sapien3.backdrop import (
 )
 from robot_layouts.simulation.sapien3.device import draws_in_software, expect_render_device
 from robot_layouts.simulation.sapien3.world import BuiltWorld
-from robot_layouts.simulation.scene.cameras import (
-    RAW_IMAGES,
-    RAY_TRACING,
-    AnyCamera,
-    RobotCamera,
-    View,
-    camera_name,
-    field_of_view,
-    lens_of,
-    ridden,
-    shaders_of,
-    told_by,
-)
-from robot_layouts.simulation.scene.looks import AS_DECLARED, LIGHTS, Looks
+from robot_layouts.simulation.variation import AS_DECLARED, LIGHTS, Looks
 from robots import SimulationError
 from robots.descriptor import Vector3
 

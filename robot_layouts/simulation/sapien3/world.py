@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
+import numpy as np
 import sapien
 import sapien.physx as physx
+from numpy.typing import NDArray
 
 from layouts import Layout
 from robot_layouts.core.portable import is_portable
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, PhysicsSettings
 from robot_layouts.simulation.sapien3.blueprint import Blueprint, read_blueprint
-from robot_layouts.simulation.sapien3.bodies import BuiltBody, build_bodies
+from robot_layouts.simulation.sapien3.bodies import BuiltBody, JointedBody, build_bodies
 from robot_layouts.simulation.sapien3.device import expect_render_device, outlive_forks
 from robot_layouts.simulation.sapien3.exact_division import divide_exactly
 from robot_layouts.simulation.sapien3.robot import SimulatedRobot
-from robot_layouts.simulation.scene.looks import AS_DECLARED
-from robot_layouts.simulation.scene.parts import Part
-from robot_layouts.simulation.scene.variation import Variation
-from robot_layouts.simulation.world import Visuals, World, WorldBody
+from robot_layouts.simulation.variation import AS_DECLARED, Variation
+from robot_layouts.simulation.world import Part, Visuals, World, WorldBody
 from robots import RobotDescriptor, SimulationError
 
 _Value = TypeVar("_Value")
@@ -184,6 +184,50 @@ class BuiltWorld:
             pose = sapien.Pose(row[:3], row[3:])
             body.set_pose(_on_its_place(body.declared, body.component, pose))
 
+    def stand(self, robot: str, qpos: Sequence[float] | NDArray[np.float64]) -> None:
+        """Stand a robot at joint positions (rad, m), at rest."""
+        self.robots[robot].reset(qpos)
+
+    def jointed(self, name: str) -> JointedBody:
+        """Return a body that has joints."""
+        body = self.bodies[name]
+        assert isinstance(body, JointedBody)
+        return body
+
+    def set_joints(self, name: str, positions: Mapping[str, float]) -> None:
+        """Move some joints of a body, at rest."""
+        self.jointed(name).set_joints(positions)
+
+    def vary(self, variation: Variation) -> None:
+        """Let it differ from what was built, as far as SAPIEN can change one in place.
+
+        Every value is set from the one that was built, so it does not depend on what was set
+        before. SAPIEN 3.0.3 has no way to change a shape's size once it is attached, nor the
+        gravity of a system that exists: for these, worlds are built anew.
+
+        Robots move when they are placed next, and pictures differ from the next one on.
+        """
+        if variation.looks is not None:
+            self.looks = variation.looks
+        for part, weightless in variation.weightless.items():
+            _component(self, part).disable_gravity = weightless
+        for part, factor in variation.mass.items():
+            component = _component(self, part)
+            mass, inertia = _as_built(self, part, "mass", lambda c=component: (c.mass, c.inertia))
+            component.set_mass(mass * factor)
+            component.set_inertia(inertia * factor)
+        for part, coefficient in variation.friction.items():
+            for material in _as_built(self, part, "friction", lambda p=part: _materials(self, p)):
+                material.set_static_friction(coefficient)
+                material.set_dynamic_friction(coefficient)
+        for part in dict.fromkeys([*variation.stiffness, *variation.damping]):
+            stiffness = variation.stiffness.get(part, 1.0)
+            _set_drive(self, part, stiffness, variation.damping.get(part, 1.0))
+        for part, coefficient in variation.joint_friction.items():
+            _joint(self, part).set_friction(coefficient)
+        for name, (position, quaternion) in variation.bases.items():
+            self.robots[name].base_pose = sapien.Pose(list(position), list(quaternion))
+
 
 def build_world(world: World, blueprints: dict[RobotDescriptor, Blueprint]) -> BuiltWorld:
     """Build what a task declared; see `BuiltWorld` for the arguments and errors."""
@@ -250,37 +294,6 @@ def build_scene(
         for joint, position in zip(robot.driven, start, strict=True):
             joint.set_drive_target(position)
     return world.scene
-
-
-def vary(world: BuiltWorld, variation: Variation) -> None:
-    """Let a world differ from what was built, as far as SAPIEN can change one in place.
-
-    Every value is set from the one that was built, so it does not depend on what was set before.
-    SAPIEN 3.0.3 has no way to change a shape's size once it is attached, nor the gravity of a
-    system that exists: for these, worlds are built anew.
-
-    Robots move when they are placed next, and pictures differ from the next one on.
-    """
-    if variation.looks is not None:
-        world.looks = variation.looks
-    for part, weightless in variation.weightless.items():
-        _component(world, part).disable_gravity = weightless
-    for part, factor in variation.mass.items():
-        component = _component(world, part)
-        mass, inertia = _as_built(world, part, "mass", lambda c=component: (c.mass, c.inertia))
-        component.set_mass(mass * factor)
-        component.set_inertia(inertia * factor)
-    for part, coefficient in variation.friction.items():
-        for material in _as_built(world, part, "friction", lambda p=part: _materials(world, p)):
-            material.set_static_friction(coefficient)
-            material.set_dynamic_friction(coefficient)
-    for part in dict.fromkeys([*variation.stiffness, *variation.damping]):
-        stiffness = variation.stiffness.get(part, 1.0)
-        _set_drive(world, part, stiffness, variation.damping.get(part, 1.0))
-    for part, coefficient in variation.joint_friction.items():
-        _joint(world, part).set_friction(coefficient)
-    for name, (position, quaternion) in variation.bases.items():
-        world.robots[name].base_pose = sapien.Pose(list(position), list(quaternion))
 
 
 def _set_drive(world: BuiltWorld, part: Part, stiffness: float, damping: float) -> None:

@@ -9,7 +9,7 @@ import torch
 
 import tasks
 from robot_layouts.simulation.sapien3.backend import worlds_below
-from robot_layouts.simulation.scene.parts import Part
+from robot_layouts.simulation.world import Part
 from robots import TaskError, UnknownNameError
 from tasks import Camera, Distractors, Light, Randomization, TaskEnv, Uniform, Whole
 

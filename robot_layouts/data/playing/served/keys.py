@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from robot_layouts.core.quoting import shown
 from robot_layouts.core.schema import AnyText, FieldError, Object, Text, check, whole, within
+from robot_layouts.simulation.cameras import camera_name, ridden
 from robot_layouts.simulation.control.joint_positions import DrivenGroup, driven_groups
-from robot_layouts.simulation.scene.cameras import camera_name, ridden
 from robots import TaskError, UnknownNameError
 from robots.action_split import is_gripper
 from robots.gripper_motion import ends_of, gripper_tree

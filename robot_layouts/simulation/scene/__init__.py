@@ -1,1 +1,0 @@
-"""What worlds are made of: shapes, parts, looks, the table, how worlds differ."""
