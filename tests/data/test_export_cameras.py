@@ -16,11 +16,10 @@ import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data.export.columns import ColumnReader, state_row
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.export.drawing import Drawing, DrawnEpisode, draw_in_order
+from robot_layouts.data.export.drawing import Drawing, DrawnEpisode
 from robot_layouts.data.export.lerobot import FileLimits, LeRobotWriter
 from robot_layouts.data.export.shots import PictureChannel, choose_shots
 from robot_layouts.data.playing.executor import ProcessExecutor
-from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
@@ -211,40 +210,6 @@ def test_worlds_that_vary_are_drawn_as_they_were(tmp_path):
 
 def flat(camera: str, value: int, moments: int = 2) -> tuple[PictureChannel, np.ndarray]:
     return PictureChannel(camera, "rgb", 16, 16), np.full((moments, 16, 16, 3), value, np.uint8)
-
-
-class OutOfTurn:
-    """Plays in any order but the one asked for."""
-
-    def run(self, prepare, seeds):
-        yield Event(None, note="hello")
-        yield Event(None, died="worker x was killed", worker="x")
-        for seed in reversed(seeds):
-            yield Event(seed, note=0.5)
-            yield Event(seed, result=DrawnEpisode(dict([flat("a", seed)]), seed % 2 == 0))
-
-
-class Job:
-    """What a crew needs to know of a job whose workers do something else."""
-
-    class shots:  # noqa: N801
-        channels = [PictureChannel("a", "rgb", 16, 16)]
-
-
-def test_episodes_are_handed_out_in_their_order(tmp_path):
-    parts, told = [], []
-    values = []
-    for episode in draw_in_order(
-        Job, OutOfTurn(), [0, 2, 3, 5], tmp_path, parts.append, told.append
-    ):
-        (frame, again) = episode
-        (picture,) = frame.values()
-        values.append((int(picture[0, 0, 0]), episode.exact))
-        np.testing.assert_array_equal(picture, *again.values())
-    assert values == [(0, True), (2, True), (3, False), (5, False)]
-    assert list(tmp_path.iterdir()) == []
-    assert parts == [0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4]
-    assert told == ["hello", "worker x was killed; another takes its place"]
 
 
 def test_full_video_files_are_followed_by_others(tmp_path):

@@ -163,10 +163,6 @@ def test_the_hub_refuses_and_the_token_stays_secret(hub, recording, capfd, fault
     assert TOKEN not in said.out + said.err
 
 
-def test_an_error_that_quotes_the_token_does_not(hub, monkeypatch):
-    assert "hf_" not in hub_reading.reason(RuntimeError(f"no such token: {TOKEN}"))
-
-
 def test_without_a_token_nothing_is_asked(hub, recording, monkeypatch, capsys):
     monkeypatch.delenv("HF_TOKEN")
     assert push(recording, NAME) == 1
@@ -186,25 +182,6 @@ def test_a_wrong_name_is_refused(hub, recording, capsys, words, message):
     assert push(recording, *words) == 1
     assert message in capsys.readouterr().err
     assert hub.requests == []
-
-
-def test_a_folder_without_data_is_refused(hub, tmp_path, capsys):
-    assert push(tmp_path, NAME) == 1
-    assert "holds neither a recording nor an export" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        (f"hub:{NAME}", "not found (404)|access refused"),
-        ("hub:pushes", "is no name on the Hub"),
-        (f"hub:{NAME}@nowhere", "not found (404)|access refused"),
-    ],
-)
-def test_what_is_not_there_is_named(hub, capsys, name, message):
-    assert main(["replay", name]) == 1
-    said = capsys.readouterr().err
-    assert any(words in said for words in message.split("|"))
 
 
 def test_an_export_is_no_recording(hub, recording, tmp_path, capsys):
@@ -261,15 +238,6 @@ def test_a_recording_with_pictures_is_refused_under_a_free_licence(
     assert push(folder, NAME) == 0
     repository = hub.repositories[NAME]
     assert b"license: cc-by-nc-4.0\n" in repository.commits[repository.head]["README.md"]
-
-
-def test_a_recording_that_is_not_finished_is_not_pushed(hub, recording, tmp_path, capsys):
-    folder = tmp_path / "unfinished"
-    shutil.copytree(recording, folder)
-    (folder / "trajectory.parts").mkdir()
-    (folder / "trajectory.parts/00007").touch()
-    assert push(folder, NAME) == 1
-    assert "is not finished: trajectory.parts holds episodes" in capsys.readouterr().err
 
 
 def described(pictures: tuple[str, ...], robot: str = "panda", task: str = TASK) -> Described:

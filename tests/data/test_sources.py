@@ -1,7 +1,6 @@
 """Policies, takeovers and correctors as sources of recordings, and what is kept of who acted."""
 
 import json
-from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from hashlib import sha256
@@ -18,7 +17,6 @@ from robot_layouts.data import evaluate, record
 from robot_layouts.data.actors import Actor, actor_of, episode_source
 from robot_layouts.data.playing.replay import replay
 from robot_layouts.data.reading.json_files import TrajectoryError
-from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts import registry
@@ -60,19 +58,6 @@ def test_a_policy_is_recorded_whoever_plays(tmp_path):
     recorded(tmp_path / "two", seeds=[2], num_envs=3)
     recorded(tmp_path / "two", num_envs=3)
     assert same_files(tmp_path / "one" / FILE, tmp_path / "two" / FILE)
-
-
-@pytest.mark.long
-def test_worlds_that_vary_are_recorded(tmp_path):
-    varied = tasks.Randomization(mass={"Tee": tasks.Uniform(0.5, 2.0)})
-    episodes = recorded(tmp_path / "one", randomization=varied)
-    drawn = [episode.drawn["mass"]["Tee"] for episode in episodes]
-    assert len(set(drawn)) == 3
-    with Recording(tmp_path / "one" / FILE) as file, closing(task_for(file)) as env:
-        assert all(replay(env, episode).difference is None for episode in file)
-        assert env.drawn() == episodes[-1].drawn
-    recorded(tmp_path / "at once", randomization=varied, num_envs=2)
-    assert same_files(tmp_path / "one" / FILE, tmp_path / "at once" / FILE)
 
 
 @pytest.mark.long
