@@ -10,13 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from tests.faults.arguments_checkers_faults import NO_POINTS
+import layouts
+import tasks
+from layouts import Frame, Layout, Placement, face_to_face, frames, wall
+from layouts.presets import PRESETS as KNOWN
 from tests.faults.fault import GOES_ON, Fault
 
 AREA = "arguments"
 NAN, INF = math.nan, math.inf
 
-NO_POINT = ((0, 0), (0, 0, "0"), (0, INF, 0), (0, 0, 1e7))  # all: arguments_checkers_faults
+NO_POINTS: tuple[Any, ...] = (
+    *(5, "abc", True, (), (0, 0), (0, 0, 0, 0), (0, 0, None), (0, 0, "0"), (0, 0, True)),
+    *((NAN, 0, 0), (0, INF, 0), (1e308, 0, 0), (0, 0, 1e7), {0, 1, 2}, {0: 1}, (1j, 0, 0)),
+    *(np.zeros((3, 1)), np.array(["a", "b", "c"]), (10**400, 0, 0)),
+)
+NO_POINT = ((0, 0), (0, 0, "0"), (0, INF, 0), (0, 0, 1e7))
 WRONG_PLACEMENTS: dict[str, tuple[Any, ...]] = {
     "position": NO_POINTS,
     "rpy": NO_POINT,
@@ -30,8 +38,7 @@ WRONG_PLACEMENTS: dict[str, tuple[Any, ...]] = {
     "robot": (None, 5, True, ["panda"], {"panda"}, b"panda", "pandda", "", object),
 }
 WRONG_DISTANCES: tuple[Any, ...] = (
-    *(None, True, "1", "Auto", b"auto", (), (1,), [1.0], {}, 1j, NAN, INF, -INF, 0, -1, 1e7, 1e308),
-    *(10**400, np.array([1.0, 2.0]), "far"),
+    *(None, True, "1", "Auto", (1,), {}, 1j, NAN, INF, 0, -1, 1e308, 10**400, np.array([1.0, 2.0])),
 )
 DISTANCES = {
     "side_by_side": "spacing",
@@ -44,32 +51,17 @@ WRONG_OPTIONS: dict[str, dict[str, tuple[Any, ...]]] = {
     "ring": {"facing": (None, 5, "center", ["out"], True, "")},
     "grid": {"columns": ("2", 0)},
     "around_table": {
-        "edges": (5, "ns", True, ["north"], {"a": "north"}, ["north", "up"], ["north", 5], object)
-        + ([["north"], "east"], {"a": "north", "c": "east"}, {"a": "north", "b": None}),
-        "table": (
-            5,
-            "large",
-            (1,),
-            (1, 1, 1),
-            (1, NAN),
-            (1, None),
-            (1, "2"),
-            (1e9, 1),
-            (0, 1),
-            True,
-        )
-        + ({1, 2}, (0.1, 1.0), [1.0, -1.0]),
+        "edges": (5, "ns", ["north"], {"a": "north"}, ["north", "up"], ["north", 5], object),
+        "table": (5, "large", (1,), (1, NAN), (1, None), (1e9, 1), (0, 1), True, {1, 2}),
     },
 }
 WRONG_ROBOTS: dict[str, Any] = {
     "nothing": {},
-    "None": None,
     "a list": ["panda", "panda"],
     "a name": "panda",
     "a number": 2,
     "names that do not exist": {"a": "panda", "b": "pandda"},
     "a robot that is None": {"a": "panda", "b": None},
-    "a robot that is a list": {"a": "panda", "b": ["panda"]},
     "a place that is a number": {1: "panda", 2: "panda"},
     "a place with a space": {"the left": "panda", "b": "panda"},
     "a place without a name": {"": "panda", "b": "panda"},
@@ -115,13 +107,7 @@ def faults() -> Iterator[Fault]:
         yield Fault(AREA, f"Layout({value!r})", partial(_call, "Layout", (value,)))
     for value in (5, [1], {"t": 5}, {5: None}, "table"):
         yield Fault(AREA, f"Layout(frames={value!r})", partial(_frames, value))
-    for value in (
-        {"left": None},
-        {"left": 5},
-        {"left": ["panda"]},
-        {"lefty": "panda"},
-        {"left": "x"},
-    ):
+    for value in ({"left": None}, {"left": 5}, {"lefty": "panda"}, {"left": "x"}):
         yield Fault(AREA, f"replace_robots({value!r})", partial(_replaced, value))
     for mode in (5, "pd_joint", ["pd_joint_pos"], True):
         yield Fault(AREA, f"in_control_mode({mode!r})", partial(_mode, mode))
@@ -140,20 +126,14 @@ def _text(value: Any) -> str:
 
 
 def _place(fields: dict[str, Any], folder: Path) -> None:
-    from layouts import Placement
-
     Placement(**{"robot": "panda", **fields})
 
 
 def _frame(fields: dict[str, Any], folder: Path) -> None:
-    from layouts import Frame
-
     Frame(**fields)
 
 
 def _layout() -> Any:
-    from layouts import face_to_face
-
     return face_to_face({"left": "panda", "right": "panda"}, spacing=1.5)
 
 
@@ -162,33 +142,21 @@ def _moved(fields: dict[str, Any], folder: Path) -> None:
 
 
 def _call(function: str, values: tuple[Any, ...], folder: Path) -> None:
-    import layouts
-    from layouts import frames
-
     (getattr(layouts, function, None) or getattr(frames, function))(*values)
 
 
 def _wall(yaw: Any, folder: Path) -> None:
-    from layouts import wall
-
     wall((0, 0, 0), yaw=yaw)
 
 
 def _preset(name: str, robots: Any, options: dict[str, Any], folder: Path) -> None:
-    from layouts.presets import PRESETS as KNOWN
-
-    if options or robots is not None:
-        some = {"a": "panda"} if name == "single" else {"a": "panda", "b": "panda"}
-        given = robots if not options else some
-    else:
-        given = robots
+    some = {"a": "panda"} if name == "single" else {"a": "panda", "b": "panda"}
+    given = some if options else robots
     needed = {"spacing": 1.5} if name in ("side_by_side", "face_to_face") else {}
     KNOWN[name](given, **{**needed, **options})
 
 
 def _frames(value: Any, folder: Path) -> None:
-    from layouts import Layout, Placement
-
     Layout({"a": Placement("panda")}, value)
 
 
@@ -201,9 +169,6 @@ def _mode(mode: Any, folder: Path) -> None:
 
 
 def _task(fields: dict[str, Any], folder: Path) -> str:
-    import tasks
-    from layouts import Layout, Placement
-
     layout = Layout({"arm": Placement("panda", **fields)})
     env = tasks.make("PickCube-v1", layout=layout, check_layout=False)
     env.reset(seed=0)

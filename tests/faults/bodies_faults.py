@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from robots import RobotLayoutsError
+from tasks.language import bodies
 from tests.faults.fault import Fault
 
 AREA = "bodies"
@@ -73,8 +75,6 @@ def _wrong() -> Iterator[tuple[str, dict[str, Any], str, tuple[Any, ...]]]:
 
 def _declare(name: str, arguments: dict[str, Any], _: Path) -> None:
     from objects import shapes
-    from robots import RobotLayoutsError
-    from tasks.language import bodies
 
     make: Callable[..., Any] = getattr(bodies, name, None) or getattr(shapes, name)
     with pytest.raises(RobotLayoutsError, match=f"^{name}: ") as caught:

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+import tasks
+from robots import RobotRegistry
 from tests.faults.fault import GOES_ON, Fault
 
 AREA = "driving bases"
@@ -61,8 +63,6 @@ def faults() -> Iterator[Fault]:
 
 @functools.cache
 def _task() -> Any:
-    import tasks
-
     return tasks.make(TASK, robots=ROBOT, obs_mode="none", check_layout=False)
 
 
@@ -84,8 +84,6 @@ def _wrong_actions() -> dict[str, Callable[[], Any]]:
 
 
 def _descriptor() -> Any:
-    from robots import RobotRegistry
-
     return RobotRegistry.load(ROBOT)
 
 
@@ -106,14 +104,10 @@ def _no_such_group(folder: Path) -> None:
 
 
 def _make(mode: Any, folder: Path) -> None:
-    import tasks
-
     tasks.make(TASK, robots=ROBOT, control_mode=mode, obs_mode="none")
 
 
 def _make_pair(mode: Any, folder: Path) -> None:
-    import tasks
-
     tasks.make(PAIR, robots={"right": ROBOT}, control_mode=mode, obs_mode="none")
 
 
@@ -134,8 +128,6 @@ def _step(name: str, folder: Path) -> None:
 
 def _as_fast_as_it_can(folder: Path) -> str:
     """Ask for five times the speed, in every mode: it drives as with once, to the last bit."""
-    import tasks
-
     for mode in ("pd_joint_delta_pos", "pd_joint_vel", "pd_ee_pose"):
         with closing(
             tasks.make(TASK, robots=ROBOT, control_mode=mode, obs_mode="none", check_layout=False)

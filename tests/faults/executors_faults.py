@@ -8,6 +8,8 @@ import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
+from robot_layouts.data.playing.executor import ProcessExecutor
+from robot_layouts.data.reading.recording import Recording
 from robots import RobotLayoutsError
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.players import AREA, Mischief, Nobody, evaluated, expect_squares, recorded
@@ -43,21 +45,15 @@ def _deaths() -> Iterator[Fault]:
 
 
 def _plays_again(what: str, folder: Path, during: str = "play") -> str:
-    from robot_layouts.data.playing.executor import ProcessExecutor
-
     executor = ProcessExecutor(1, episode_timeout=1.0)
     return expect_squares(executor, Mischief(folder, what, during))
 
 
 def _naps(folder: Path) -> str:
-    from robot_layouts.data.playing.executor import ProcessExecutor
-
     return expect_squares(ProcessExecutor(1), Mischief(folder, "nap", "play"), deaths=0)
 
 
 def _gives_up(what: str, folder: Path, during: str) -> None:
-    from robot_layouts.data.playing.executor import ProcessExecutor
-
     executor = ProcessExecutor(1, attempts=2, episode_timeout=0.3)
     for event in executor.run(Mischief(folder, what, during, again=True), range(3)):
         if event.error is not None:
@@ -225,8 +221,6 @@ def _with_executor(what: str, folder: Path) -> None:
 
 
 def _recording_with_forgetful_executor(folder: Path) -> None:
-    from robot_layouts.data.reading.recording import Recording
-
     executor = Nobody()
     executor.what = "forgets one"
     try:

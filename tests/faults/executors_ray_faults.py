@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+from robot_layouts.data.playing.ray_executor import RayExecutor
+from tests.data.clusters import running_cluster
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.players import (
     AREA,
@@ -70,8 +72,6 @@ def _clusters() -> Iterator[Fault]:
 @functools.cache
 def _cluster() -> Any:
     """Return a cluster of one node with a CPU, which lives as long as this process."""
-    from tests.data.clusters import running_cluster
-
     manager = running_cluster()
     nodes = manager.__enter__()
     atexit.register(manager.__exit__, None, None, None)
@@ -80,8 +80,6 @@ def _cluster() -> Any:
 
 
 def _on_ray(**more: Any) -> Any:
-    from robot_layouts.data.playing.ray_executor import RayExecutor
-
     modules = ["tests.faults.players"]
     return RayExecutor(_cluster().address, 1, modules=modules, episode_timeout=2.0, **more)
 
@@ -105,8 +103,6 @@ def _unloadable_on_ray(folder: Path) -> None:
 
 
 def _join(address: str) -> None:
-    from robot_layouts.data.playing.ray_executor import RayExecutor
-
     next(RayExecutor(address).run(Mischief(Path(), "", ""), [0]))
 
 

@@ -12,7 +12,11 @@ from unittest import mock
 
 import pytest
 
+from robot_layouts.data.publishing.push import DatasetPush, Sharing
+from robot_layouts.data.reading import hub
+from robot_layouts.data.reading.recording import Recording
 from robots import RobotLayoutsError
+from tests.data.recordings import record
 from tests.data.writable_hub import TOKEN, WritableHub
 from tests.faults.fault import GOES_ON, Fault
 from tests.robots import hub_server
@@ -140,8 +144,6 @@ def faults() -> Iterator[Fault]:
 @functools.cache
 def _recorded() -> Path:
     """Return the folder of a small recording, which stays as it is."""
-    from tests.data.recordings import record
-
     folder = Path(tempfile.mkdtemp()) / "recording"
     folder.mkdir()
     record(folder / "trajectory.h5", TASK, [2])
@@ -152,8 +154,6 @@ def _recorded() -> Path:
 def _hub(folder: Path) -> Iterator[WritableHub]:
     """Run a Hub that a process with a token finds, and a cache of its own."""
     from huggingface_hub import constants
-
-    from robot_layouts.data.reading import hub
 
     hub._downloaded.cache_clear()
     with WritableHub({}) as server, ExitStack() as stack:
@@ -176,15 +176,11 @@ def _hub(folder: Path) -> Iterator[WritableHub]:
 
 
 def _push(folder: Path | None = None) -> str:
-    from robot_layouts.data.publishing.push import DatasetPush, Sharing
-
     return DatasetPush.of(folder or _recorded(), NAME, Sharing())()
 
 
 def _read(name: str = f"hub:{NAME}") -> int:
     """Read all episodes; returns how many."""
-    from robot_layouts.data.reading.recording import Recording
-
     with Recording(name) as file:
         return len([file[number] for number in range(len(file))])
 

@@ -9,6 +9,9 @@ from typing import Any
 
 import pytest
 
+import tasks
+from layouts import Layout, single
+from robots import RobotLayoutsError, RobotRegistry
 from tests.faults.fault import Fault
 
 AREA = "long names"
@@ -23,26 +26,18 @@ def faults() -> Iterator[Fault]:
 
 
 def _make(**arguments: Any) -> Any:
-    import tasks
-
     return tasks.make(**{"task_id": "PushCube-v1", **arguments})
 
 
 def _load(name: str) -> Any:
-    from robots import RobotRegistry
-
     return RobotRegistry.load(name)
 
 
 def _layout(name: str) -> Any:
-    from layouts import single
-
     return single({name: "panda"})
 
 
 def _yaml(text: str) -> Any:
-    from layouts import Layout
-
     return Layout.from_yaml(text)
 
 
@@ -63,8 +58,6 @@ _TAKES: dict[str, Callable[[str], Any]] = {
 
 
 def _refused_in_short(take: Callable[[str], Any], _: Path) -> None:
-    from robots import RobotLayoutsError
-
     with pytest.raises(RobotLayoutsError) as caught:
         take(NAME)
     assert len(str(caught.value)) <= LONGEST

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+from layouts.viewer.page import save_html, serve
 from tests.faults.fault import Fault
 from tests.faults.served_page import cell, served
 
@@ -41,8 +42,6 @@ def faults() -> Iterator[Fault]:
 
 
 def _serve(host: str, port: int) -> None:
-    from layouts.viewer.page import serve
-
     serve(cell(), host, port, lambda line: None)
 
 
@@ -68,8 +67,6 @@ def _serve_unguarded(_: Path) -> None:
 
 
 def _save(folder: Path, name: str) -> None:
-    from layouts.viewer.page import save_html
-
     (folder / "folder.html").mkdir()
     (folder / "file").write_text("")
     try:

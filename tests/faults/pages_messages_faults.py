@@ -7,8 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from layouts.viewer.guard import MOST_CLIENTS
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.served_page import others_go_on, served, steer, still_served
+from tests.layouts.guests import Guest
+from tests.pages import wait_until
 
 AREA = "pages"
 OTHER_KINDS = (  # which viser knows, and no page of ours needs
@@ -78,8 +81,6 @@ def _update(uuid: object, updates: object) -> dict[str, object]:
 
 def _message(number: int) -> str:
     """Send a wrong message, then a right one; nothing but the right one may have an effect."""
-    from tests.layouts.guests import Guest
-
     site = served()
     before = site.page._qpos["arm"].copy()
     with Guest(site.address) as sees, Guest(site.address) as means_harm:
@@ -103,8 +104,6 @@ def _message(number: int) -> str:
 
 
 def _tunnel(_: Path) -> str:
-    from tests.layouts.guests import Guest
-
     server, calls = served().server, []
     server.request_share_url = lambda *_: calls.append("a tunnel")
     try:
@@ -124,8 +123,6 @@ def _tunnel(_: Path) -> str:
 def _large(_: Path) -> str:
     from websockets.exceptions import ConnectionClosed
 
-    from tests.layouts.guests import Guest
-
     with Guest(served().address) as means_harm:
         try:
             means_harm.send(b"\0" * 10_000_000)
@@ -137,8 +134,6 @@ def _large(_: Path) -> str:
 
 
 def _deaf(_: Path) -> None:
-    from tests.layouts.guests import Guest
-
     with Guest(served().address) as deaf:
         deaf.enter()
         for _ in range(20):
@@ -146,8 +141,6 @@ def _deaf(_: Path) -> None:
 
 
 def _vanishes(_: Path) -> None:
-    from tests.layouts.guests import Guest
-
     for _ in range(5):
         client = Guest(served().address)
         client.enter()
@@ -180,10 +173,6 @@ def _silent(_: Path) -> None:
 
 def _crowd(_: Path) -> str:
     from websockets.exceptions import InvalidStatus
-
-    from layouts.viewer.guard import MOST_CLIENTS
-    from tests.layouts.guests import Guest
-    from tests.pages import wait_until
 
     site, guests = served(), []
     wait_until(lambda: not site.server.get_clients())

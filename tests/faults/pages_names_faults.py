@@ -7,7 +7,12 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+from layouts import single
+from layouts.viewer import ShownCell
+from layouts.viewer.page import NO_SLIDERS, save_html
+from layouts.viewer.text import as_html, printable
 from tests.faults.fault import GOES_ON, REFUSED, Fault, run_command
+from tests.layouts.guests import Guest, named_robot, site, small_cell
 from tests.layouts.hostile_names import HOSTILE_NAMES
 
 AREA = "pages"
@@ -35,9 +40,6 @@ def faults() -> Iterator[Fault]:
 
 
 def _name(folder: Path, place: str, name: str) -> str:
-    from layouts.viewer.text import printable
-    from tests.layouts.guests import Guest, site, small_cell
-
     names = {"link": {"lower": name}, "joint": {"elbow": name}}.get(place, {})
     cell = small_cell(folder, name if place == "title" else "cell", **names)
     cell.notes += [name] if place == "note" else []
@@ -81,10 +83,6 @@ def _plain(message: dict[str, Any]) -> str:
 
 
 def _saved_name(folder: Path, name: str) -> str:
-    from layouts.viewer.page import NO_SLIDERS, save_html
-    from layouts.viewer.text import printable
-    from tests.layouts.guests import small_cell
-
     pages = []
     for called in (name, "harmless"):
         cell = small_cell(folder, called, upper=f"{called} 1", lower=called, elbow=f"{called} 2")
@@ -98,10 +96,6 @@ def _saved_name(folder: Path, name: str) -> str:
 
 
 def _robot(folder: Path, name: str) -> str:
-    from layouts import single
-    from layouts.viewer import ShownCell
-    from tests.layouts.guests import named_robot, site
-
     with site(ShownCell("cell", single({name: named_robot(folder)}))) as running:
         nodes = running.server.scene._handle_from_node_name
         assert type(nodes["/(floor)"]).__name__ == "GridHandle"
@@ -110,8 +104,6 @@ def _robot(folder: Path, name: str) -> str:
 
 
 def _paths(folder: Path) -> str:
-    from tests.layouts.guests import site, small_cell
-
     with site(small_cell(folder, upper="a", lower="a/b")) as running:
         nodes = running.server.scene._handle_from_node_name
         assert {"/arm/collision/a", "/arm/collision/a%2Fb"} <= set(nodes)
@@ -119,9 +111,6 @@ def _paths(folder: Path) -> str:
 
 
 def _file(folder: Path, name: str) -> str:
-    from layouts import single
-    from layouts.viewer.text import as_html, printable
-
     (folder / name).write_text(single({"arm": "so100"}).to_yaml())
     done = run_command("layouts", "view", str(folder / name), "--html", str(folder / "p.html"))
     assert "\x1b" not in done.stdout

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.served_page import served, still_served
+from tests.layouts.guests import WEBSOCKET, ask, talk
 
 AREA = "pages"
 EVIL = "evil.example"
@@ -84,8 +85,6 @@ def _request(
 
 def _ask(kind: str, headers: dict[str, str], path: str, verb: str) -> str:
     """Send a request in which only one thing is wrong, and look that it is answered by nothing."""
-    from tests.layouts.guests import WEBSOCKET, ask
-
     site = served()
     own = f"127.0.0.1:{site.port}"
     pairs = {"Host": own} | ({"Origin": f"http://{own}", **WEBSOCKET} if kind != "page" else {})
@@ -102,8 +101,6 @@ def _ask(kind: str, headers: dict[str, str], path: str, verb: str) -> str:
 
 
 def _garbage(sent: bytes) -> str:
-    from tests.layouts.guests import talk
-
     status, answer = talk(served().port, sent, ends=True)
     assert status in (0, 400, 403), f"answered by {status}"
     assert b"Viser" not in answer

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from layouts import Layout, Placement
+from robot_layouts.data import evaluate
 from robots import RobotLayoutsError
 from tests.faults.fault import GOES_ON, Fault, run_command
 from tests.faults.players import recorded
@@ -117,8 +118,6 @@ def _into_one_folder(folder: Path) -> None:
 
 
 def _evaluate(_: Path) -> None:
-    from robot_layouts.data import evaluate
-
     calls = [lambda w=w: evaluate("expert", "PushCube-v1", (0,), workers=w) for w in (0, 1)]
     assert not _all(*calls)
 

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from tasks import Distractors, Randomization
 from tests.faults.fault import Fault
 
 AREA = "randomization"
@@ -56,12 +57,8 @@ def faults() -> Iterator[Fault]:
 
 
 def _read(data: Any, folder: Path) -> None:
-    from tasks import Randomization
-
     Randomization.from_json(data)
 
 
 def _uncounted(folder: Path) -> None:
-    from tasks import Distractors
-
     Distractors(count=None)

@@ -14,6 +14,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from robot_layouts.data import evaluate
+from robot_layouts.data.receipts import Receipt, ReceiptError, verify
 from tests.faults.fault import GOES_ON, Fault, run_command
 
 AREA = "receipts"
@@ -60,8 +62,6 @@ def faults() -> Iterator[Fault]:
 @functools.cache
 def contents() -> str:
     """Return the text of a small receipt, as it was written."""
-    from robot_layouts.data import evaluate
-
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "receipt.json"
         evaluate(POLICY, TASK, SEEDS, workers=0, receipt=path, max_episode_steps=STEPS)
@@ -70,8 +70,6 @@ def contents() -> str:
 
 def edited(folder: Path, edit: Callable[[Any], object]) -> Path:
     """Write the receipt, changed and with the hash of what it has become, to a folder."""
-    from robot_layouts.data.receipts import Receipt, ReceiptError
-
     path, about = folder / "receipt.json", json.loads(contents())
     edit(about)
     path.write_text(json.dumps(about))
@@ -83,8 +81,6 @@ def edited(folder: Path, edit: Callable[[Any], object]) -> Path:
 
 
 def _verify(folder: Path, edit: Callable[[Any], object]) -> Any:
-    from robot_layouts.data.receipts import verify
-
     return verify(edited(folder, edit), workers=0, policy=POLICY)
 
 
@@ -96,8 +92,6 @@ def _differs(folder: Path, edit: Callable[[Any], object]) -> str:
 
 
 def _read(folder: Path, make: Callable[[Path], object]) -> None:
-    from robot_layouts.data.receipts import verify
-
     make(folder / "receipt.json")
     verify(folder / "receipt.json", workers=0, policy=POLICY)
 
@@ -392,8 +386,6 @@ _STRANGE_ROBOTS: dict[str, Callable[[Any], object]] = {
 
 
 def _verified(folder: Path, **arguments: Any) -> None:
-    from robot_layouts.data.receipts import verify
-
     verify(edited(folder, lambda _: None), **{"workers": 0, **arguments})
 
 

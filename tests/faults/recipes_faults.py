@@ -7,7 +7,10 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from robot_layouts.data.playing.command_options import Players
+from robot_layouts.data.recipes.build import build_command, recipe_command
 from robots import RobotLayoutsError
+from tests.data.recordings import record
 from tests.faults.fault import GOES_ON, Fault, run_command
 
 AREA = "recipes"
@@ -143,9 +146,6 @@ def faults() -> Iterator[Fault]:
 
 def _make(folder: Path, *words: str) -> int:
     """Build the folder's recipe here; returns the exit code of the command."""
-    from robot_layouts.data.playing.command_options import Players
-    from robot_layouts.data.recipes.build import build_command
-
     only = {"only": words} if words else {}
     players = Players(workers=0)  # no module but ours is named, or the command is run
     return build_command(
@@ -271,8 +271,6 @@ _KEEP = "include_failures: true"
 
 
 def _recipe_of(folder: Path, make: Callable[[Path], object]) -> None:
-    from robot_layouts.data.recipes.build import recipe_command
-
     make(folder / "recording")
     try:
         recipe_command(folder / "recording", out=folder / "recipe.yaml")
@@ -281,8 +279,6 @@ def _recipe_of(folder: Path, make: Callable[[Path], object]) -> None:
 
 
 def _recorded(path: Path, file: str = "", text: str = "") -> None:
-    from tests.data.recordings import record
-
     path.mkdir()
     record(path / "trajectory.h5", TASK, [2])
     if file:

@@ -8,6 +8,10 @@ from typing import Any
 
 import h5py
 
+from robot_layouts.data.export.dataset import Export, export
+from robot_layouts.data.playing.replay import open_recording, replay
+from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.viewing import episode_cell
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.recording_files import (
     AREA,
@@ -70,9 +74,6 @@ def _flip_and_use(folder: Path, where: str, use: Callable[[Path], Any]) -> None:
 
 
 def _replay(path: Path) -> None:
-    from robot_layouts.data.playing.replay import open_recording, replay
-    from robot_layouts.data.reading.recorded_task import task_for
-
     with open_recording(path, None) as file:
         task = task_for(file)
         for episode in file:
@@ -88,8 +89,6 @@ def _export_robomimic(path: Path) -> None:
 
 
 def _export(path: Path, format_name: str) -> None:
-    from robot_layouts.data.export.dataset import Export, export
-
     try:
         export(Export(path, format_name, path.parent / "out", include_failures=True))
     finally:
@@ -97,9 +96,6 @@ def _export(path: Path, format_name: str) -> None:
 
 
 def _view(path: Path) -> None:
-    from robot_layouts.data.playing.replay import open_recording
-    from robot_layouts.data.viewing import episode_cell
-
     with open_recording(path, None) as file:
         episode_cell(file, 1)
 

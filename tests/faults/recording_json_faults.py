@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from robot_layouts.data.playing.replay import open_recording
+from robot_layouts.data.reading.recorded_task import task_for
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.recording_files import (
     AREA,
@@ -90,9 +92,6 @@ def _remove(folder: Path, place: tuple[str | int, ...]) -> None:
 
 def _play(path: Path) -> None:
     """Do with a recording what a replay does before it plays."""
-    from robot_layouts.data.playing.replay import open_recording
-    from robot_layouts.data.reading.recorded_task import task_for
-
     with open_recording(path, None) as file:
         task_for(file).close()
     read(path)

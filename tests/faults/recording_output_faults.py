@@ -13,7 +13,9 @@ from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
+from robot_layouts.__main__ import main
 from robot_layouts.core.commands import printable
+from robot_layouts.data.export.dataset import Export, export
 from robots import RobotLayoutsError
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.recording_files import AREA, edited, recording
@@ -147,8 +149,6 @@ def _slow_export(path: Path, out: Path) -> subprocess.Popen[str]:
 
 
 def _export(path: Path, out: Path) -> None:
-    from robot_layouts.data.export.dataset import Export, export
-
     assert export(Export(path, "robomimic", out, include_failures=True)).episodes == 3
 
 
@@ -221,8 +221,6 @@ _TAKEN: dict[str, Callable[[Path], None]] = {
 
 
 def _named(folder: Path, name: str) -> str:
-    from robot_layouts.__main__ import main
-
     place = folder / name
     place.mkdir(parents=True)
     with redirect_stdout(io.StringIO()) as printed:
@@ -235,8 +233,6 @@ def _named(folder: Path, name: str) -> str:
 
 def _steering(folder: Path) -> None:
     """Refuse a file with such a name as the command does, which prints it."""
-    from robot_layouts.__main__ import main
-
     path = recording(folder)
     with edited(path) as file:
         states = file["traj_0/env_states/actors"]

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import tasks
+from robot_layouts.data.recording.recorder import Recorder
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.recording_files import (
     AREA,
@@ -234,9 +236,6 @@ def _renamed(folder: Path) -> str:
 
 
 def _other_task(folder: Path) -> None:
-    import tasks
-    from robot_layouts.data.recording.recorder import Recorder
-
     path = _stopped(folder)
     Recorder(path, tasks.make("PullCube-v1"), resume=True)
 

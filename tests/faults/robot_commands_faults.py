@@ -18,8 +18,9 @@ from robots.fetch_assets import main as fetch_assets
 from robots.fetch_assets import robot_files
 from robots.from_urdf import main as from_urdf
 from robots.inspect import main as inspect
-from tests.faults.fault import GOES_ON, Fault
+from tests.faults.fault import GOES_ON, Fault, run_command
 from tests.faults.tiny_files import run_main, settings
+from tests.robots.conftest import contents
 from tests.robots.hub_server import HubServer, stall
 
 AREA = "robot commands"
@@ -138,8 +139,6 @@ def _complete(root: Path) -> bool:
 
 
 def _full_output(folder: Path) -> None:
-    from tests.faults.fault import run_command
-
     line = f"{shlex.quote(sys.executable)} -m robots.inspect panda > /dev/full"
     done = subprocess.run(
         ["bash", "-c", line],
@@ -172,8 +171,6 @@ def _odd_folder(name: str) -> Callable[[Path], None]:
 
 def _interrupted(number: signal.Signals) -> Callable[[Path], str]:
     def run(folder: Path) -> str:
-        from tests.robots.conftest import contents
-
         files = robot_files(RobotRegistry.load("koch"), pictures=False)
         served = {f"{file.origin.hub_folder}/{file.path}": contents(file) for file in files}
         reached = threading.Event()

@@ -14,6 +14,9 @@ from typing import Any
 
 import pytest
 
+from robot_layouts.data.suite.run import run_suite, verify_run
+from robot_layouts.data.suite.suite import load_suite
+from robots import RobotLayoutsError
 from tests.faults.fault import GOES_ON, Fault, run_command
 
 AREA = "suites"
@@ -56,8 +59,6 @@ def faults() -> Iterator[Fault]:
 
 
 def _load(folder: Path, text: str) -> None:
-    from robot_layouts.data.suite.suite import load_suite
-
     (folder / "suite.yaml").write_text(text)
     load_suite(folder / "suite.yaml")
 
@@ -171,9 +172,6 @@ _ELSEWHERE = {
 
 def _reads_nothing(folder: Path, key: str, value: str) -> None:
     """Read a suite in a folder below that of a secret; no message tells the secret."""
-    from robot_layouts.data.suite.suite import load_suite
-    from robots import RobotLayoutsError
-
     (folder / "secret.yaml").write_text(SECRET)
     own = folder / "theirs"
     (own / "inside").mkdir(parents=True)
@@ -220,16 +218,12 @@ def _runs_nothing(folder: Path, words: tuple[str, ...], text: str) -> None:
 
 
 def _suite(folder: Path, text: str = SUITE) -> Any:
-    from robot_layouts.data.suite.suite import load_suite
-
     (folder / "mine.yaml").write_text(text)
     return load_suite(folder / "mine.yaml")
 
 
 def _play(folder: Path, policy: Any = POLICY, text: str = SUITE, **how: Any) -> Mapping[str, Any]:
     """Play a suite into the folder's ``run``, and return the hashes of its receipts."""
-    from robot_layouts.data.suite.run import run_suite
-
     run = run_suite(_suite(folder, text), folder / "run", policy, **{"workers": 0, **how})
     return {name: receipt.hash for name, receipt in run.receipts.items()}
 
@@ -305,8 +299,6 @@ def _another(folder: Path) -> None:
 
 
 def _verify(folder: Path, **how: Any) -> None:
-    from robot_layouts.data.suite.run import verify_run
-
     _play(folder)
     verify_run(folder / "run", workers=0, **how)
 
