@@ -245,7 +245,7 @@ def test_the_command(played, tmp_path, capsys):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_a_process_that_is_stopped(how, tmp_path):
     long = Suite("long", (FIRST, replace(LATER, seeds=range(100_000))))
     file, out = tmp_path / "long.yaml", tmp_path / "run"

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from robots import RobotLayoutsError
 
@@ -34,6 +35,19 @@ class Fault:
     what: str
     run: Callable[[Path], str | None]
     promise: str = REFUSED
+
+
+def each(
+    area: str,
+    what: str,
+    run: Callable[[Path, Any], str | None],
+    values: Mapping[str, Any],
+    promise: str = REFUSED,
+) -> Iterator[Fault]:
+    """Go through faults of one kind: `run` tries each value, whose name is put into `what`."""
+    for name, value in values.items():
+        tried = what.replace("{}", name)
+        yield Fault(area, tried, lambda folder, value=value: run(folder, value), promise)
 
 
 def run_command(

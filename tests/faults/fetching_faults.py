@@ -8,6 +8,7 @@ import shutil
 import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from unittest import mock
 
@@ -118,11 +119,13 @@ def faults() -> Iterator[Fault]:
         yield _of_hub(f"has an HF_HOME that is {what}", HF_HUB_CACHE=f"{home}/hub")
     yield _of_hub("is not asked: HF_HUB_OFFLINE=1", HF_HUB_OFFLINE=True)
     yield Fault(AREA, "Hub behind TLS that nobody has signed", _tls)
-    yield Fault(AREA, "Hub redirects to another host that has it", _elsewhere(right=True), GOES_ON)
-    yield Fault(AREA, "Hub redirects to another host that lies", _elsewhere(right=False))
-    yield Fault(AREA, "the Hub's cache has a FIFO", _in_hub_cache(os.mkfifo), GOES_ON)
-    yield Fault(AREA, "the Hub's cache has ten terabytes", _in_hub_cache(_sparse), GOES_ON)
-    yield Fault(AREA, "the Hub's cache has other bytes", _in_hub_cache(_other), GOES_ON)
+    yield Fault(
+        AREA, "Hub redirects to another host that has it", partial(_elsewhere, right=True), GOES_ON
+    )
+    yield Fault(AREA, "Hub redirects to another host that lies", partial(_elsewhere, right=False))
+    yield Fault(AREA, "the Hub's cache has a FIFO", partial(_in_hub_cache, os.mkfifo), GOES_ON)
+    yield Fault(AREA, "the Hub's cache has ten terabytes", partial(_in_hub_cache, _sparse), GOES_ON)
+    yield Fault(AREA, "the Hub's cache has other bytes", partial(_in_hub_cache, _other), GOES_ON)
     yield from _of_wheel()
 
 
@@ -172,33 +175,27 @@ def _tls(folder: Path) -> None:
         fetch(AssetStore(folder / "assets"), [HubSource()])
 
 
-def _elsewhere(*, right: bool) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
-        path = f"/datasets/{hub_server.DATASET}/resolve/{COMMIT}/{ORIGIN.hub_folder}/{MESH.path}"
-        data = CONTENTS[MESH.path] if right else b"x" * MESH.bytes
-        with (
-            HubServer({f"{ORIGIN.hub_folder}/{MESH.path}": data}) as other,
-            _hub(folder) as server,
-        ):
-            server.fail("GET", "a.stl", redirect(f"{other.endpoint}{path}"))
-            fetch(AssetStore(folder / "assets"), [HubSource()])
-
-    return run
+def _elsewhere(folder: Path, *, right: bool) -> None:
+    path = f"/datasets/{hub_server.DATASET}/resolve/{COMMIT}/{ORIGIN.hub_folder}/{MESH.path}"
+    data = CONTENTS[MESH.path] if right else b"x" * MESH.bytes
+    with (
+        HubServer({f"{ORIGIN.hub_folder}/{MESH.path}": data}) as other,
+        _hub(folder) as server,
+    ):
+        server.fail("GET", "a.stl", redirect(f"{other.endpoint}{path}"))
+        fetch(AssetStore(folder / "assets"), [HubSource()])
 
 
-def _in_hub_cache(put: Callable[[Path], object]) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
-        with _hub(folder):
-            store = AssetStore(folder / "assets")
-            fetch(store, [HubSource()])
-            (cached,) = (folder / "hf_home").rglob("snapshots/*/robots/*/meshes/a.stl")
-            blob = cached.resolve()
-            blob.unlink()
-            put(blob)
-            shutil.rmtree(store.root)
-            fetch(store, [HubSource()])
-
-    return run
+def _in_hub_cache(put: Callable[[Path], object], folder: Path) -> None:
+    with _hub(folder):
+        store = AssetStore(folder / "assets")
+        fetch(store, [HubSource()])
+        (cached,) = (folder / "hf_home").rglob("snapshots/*/robots/*/meshes/a.stl")
+        blob = cached.resolve()
+        blob.unlink()
+        put(blob)
+        shutil.rmtree(store.root)
+        fetch(store, [HubSource()])
 
 
 def _sparse(path: Path) -> None:

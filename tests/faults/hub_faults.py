@@ -18,7 +18,7 @@ from robot_layouts.data.reading.recording import Recording
 from robots import RobotLayoutsError
 from tests.data.recordings import record
 from tests.data.writable_hub import TOKEN, WritableHub
-from tests.faults.fault import GOES_ON, Fault
+from tests.faults.fault import GOES_ON, Fault, each
 from tests.robots import hub_server
 from tests.robots.hub_server import page, status
 
@@ -105,16 +105,13 @@ def faults() -> Iterator[Fault]:
         for what, fault in ANSWERS.items():
             run = functools.partial(_not_read, request=("GET", part), fault=fault)
             yield Fault(AREA, f"it answers {what} when {when} to be read are looked up", run)
-    for what, name in NAMES.items():
-        yield Fault(AREA, f"a name {what}", functools.partial(_not_read, name=name))
+    yield from each(AREA, "a name {}", _not_read, NAMES)
     for what, address in ENDPOINTS.items():
         yield Fault(AREA, f"reading at an address {what}", functools.partial(_elsewhere, address))
         run = functools.partial(_elsewhere, address, push=True)
         yield Fault(AREA, f"pushing to an address {what}", run)
-    for what, change in CONTENTS.items():
-        yield Fault(AREA, f"it holds {what}", functools.partial(_holds, change=change))
-    for what, make in _FOLDERS.items():
-        yield Fault(AREA, f"pushing {what}", functools.partial(_push_of, make=make))
+    yield from each(AREA, "it holds {}", _holds, CONTENTS)
+    yield from each(AREA, "pushing {}", _push_of, _FOLDERS)
     for what, token in (("no token", ""), ("a token of two lines", "hf_a\nb")):
         yield Fault(AREA, f"pushing with {what}", functools.partial(_with_token, token=token))
     yield Fault(AREA, "a push that failed in the middle, and again", _goes_on, GOES_ON)

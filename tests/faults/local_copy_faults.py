@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 from robot_layouts.core.paths import default_root
@@ -62,28 +63,28 @@ NAMES = {
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
     for what, put in IN_PLACE.items():
-        yield Fault(AREA, f"in place of a robot file: {what}", _exchanged(put), GOES_ON)
-        yield Fault(AREA, f"a local copy to fetch from has {what}", _as_source(put))
+        yield Fault(AREA, f"in place of a robot file: {what}", partial(_exchanged, put), GOES_ON)
+        yield Fault(AREA, f"a local copy to fetch from has {what}", partial(_as_source, put))
     yield Fault(AREA, "in place of a robot file: a directory", _directory)
     yield Fault(AREA, "in place of a package: a file", _package_is_a_file)
     for what, put in ROOTS.items():
-        yield Fault(AREA, f"the local copy is {what}", _root(put))
+        yield Fault(AREA, f"the local copy is {what}", partial(_root, put))
     for what, name in NAMES.items():
-        yield Fault(AREA, f"ROBOT_LAYOUTS_ASSETS is {what}", _named(name))
+        yield Fault(AREA, f"ROBOT_LAYOUTS_ASSETS is {what}", partial(_named, name))
     for what, name in {
         "with a line break": "a\nb",
         "with spaces and quotes": " ' \" ",
         "no UTF-8": "caf\udce9",
         "with ..": "a/../b",
     }.items():
-        yield Fault(AREA, f"ROBOT_LAYOUTS_ASSETS is {what}", _odd_name(name), GOES_ON)
+        yield Fault(AREA, f"ROBOT_LAYOUTS_ASSETS is {what}", partial(_odd_name, name), GOES_ON)
     for what, name, put in (
         ("the lock is a FIFO", ".lock", os.mkfifo),
         ("the scratch folder is a file", ".partial", Path.touch),
         ("the scratch folder is a link", ".partial", lambda path: path.symlink_to("/tmp")),
         ("a killed fetch left things behind", ".partial", _left_behind),
     ):
-        yield Fault(AREA, what, _beside(name, put), GOES_ON)
+        yield Fault(AREA, what, partial(_beside, name, put), GOES_ON)
     yield Fault(AREA, "the lock is a directory", _lock_is_a_directory)
     yield Fault(AREA, "a disk that becomes full", _full_disk)
     yield Fault(AREA, "no file descriptors left", _no_descriptors)
@@ -95,34 +96,28 @@ def faults() -> Iterator[Fault]:
     )
 
 
-def _exchanged(put: Callable[[Path], object]) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
-        store = fill(AssetStore(folder / "assets"))
-        store.path(MESH).unlink()
-        put(store.path(MESH))
-        with deadline():
+def _exchanged(put: Callable[[Path], object], folder: Path) -> None:
+    store = fill(AssetStore(folder / "assets"))
+    store.path(MESH).unlink()
+    put(store.path(MESH))
+    with deadline():
+        assert store.unusable(FILES) == [MESH]
+        fetch(store, [another_copy(folder)])
+    assert store.path(MESH).is_file()
+    assert not store.path(MESH).is_symlink()
+
+
+def _as_source(put: Callable[[Path], object], folder: Path) -> None:
+    source = another_copy(folder)
+    damaged = AssetStore(folder / "elsewhere")
+    damaged.path(MESH).unlink()
+    put(damaged.path(MESH))
+    store = AssetStore(folder / "assets")
+    with deadline():
+        try:
+            fetch(store, [source])
+        finally:
             assert store.unusable(FILES) == [MESH]
-            fetch(store, [another_copy(folder)])
-        assert store.path(MESH).is_file()
-        assert not store.path(MESH).is_symlink()
-
-    return run
-
-
-def _as_source(put: Callable[[Path], object]) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
-        source = another_copy(folder)
-        damaged = AssetStore(folder / "elsewhere")
-        damaged.path(MESH).unlink()
-        put(damaged.path(MESH))
-        store = AssetStore(folder / "assets")
-        with deadline():
-            try:
-                fetch(store, [source])
-            finally:
-                assert store.unusable(FILES) == [MESH]
-
-    return run
 
 
 def _directory(folder: Path) -> None:
@@ -140,50 +135,38 @@ def _package_is_a_file(folder: Path) -> None:
     fetch(store, [another_copy(folder)])
 
 
-def _root(put: Callable[[Path], object]) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
-        root = folder / "in" / "assets"
-        root.parent.mkdir()
-        put(root)
-        with deadline(), settings(folder, ROBOT_LAYOUTS_ASSETS=str(root)):
-            ensure(FILES, AssetStore(default_root()), [another_copy(folder)])
-
-    return run
+def _root(put: Callable[[Path], object], folder: Path) -> None:
+    root = folder / "in" / "assets"
+    root.parent.mkdir()
+    put(root)
+    with deadline(), settings(folder, ROBOT_LAYOUTS_ASSETS=str(root)):
+        ensure(FILES, AssetStore(default_root()), [another_copy(folder)])
 
 
-def _named(name: str) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
+def _named(name: str, folder: Path) -> None:
+    with settings(folder, ROBOT_LAYOUTS_ASSETS=name):
+        ensure(FILES, AssetStore(default_root()), [another_copy(folder)])
+
+
+def _odd_name(name: str, folder: Path) -> None:
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
         with settings(folder, ROBOT_LAYOUTS_ASSETS=name):
-            ensure(FILES, AssetStore(default_root()), [another_copy(folder)])
-
-    return run
-
-
-def _odd_name(name: str) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
-        before = Path.cwd()
-        os.chdir(folder)
-        try:
-            with settings(folder, ROBOT_LAYOUTS_ASSETS=name):
-                store = AssetStore(default_root())
-                fetch(store, [another_copy(folder)])
-        finally:
-            os.chdir(before)
-        assert store.root.is_absolute()
-        expect_all(store)
-
-    return run
-
-
-def _beside(name: str, put: Callable[[Path], object]) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
-        store = AssetStore(folder / "assets")
-        store.root.mkdir()
-        put(store.root / name)
-        with deadline():
+            store = AssetStore(default_root())
             fetch(store, [another_copy(folder)])
+    finally:
+        os.chdir(before)
+    assert store.root.is_absolute()
+    expect_all(store)
 
-    return run
+
+def _beside(name: str, put: Callable[[Path], object], folder: Path) -> None:
+    store = AssetStore(folder / "assets")
+    store.root.mkdir()
+    put(store.root / name)
+    with deadline():
+        fetch(store, [another_copy(folder)])
 
 
 def _left_behind(path: Path) -> None:

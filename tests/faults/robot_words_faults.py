@@ -13,7 +13,7 @@ from robot_layouts.motion import Motion
 from robots import RobotDescriptor
 from robots.named import named_robot
 from tests.experts.free_motions import swing
-from tests.faults.fault import GOES_ON, Fault
+from tests.faults.fault import GOES_ON, Fault, each
 from tests.robots.urdf_parts import Parts
 
 AREA = "robot words"
@@ -26,12 +26,8 @@ def faults() -> Iterator[Fault]:
     for what, word in _WORDS.items():
         yield Fault(AREA, what, lambda folder, w=word: _named(folder, w))
         yield Fault(AREA, f"{what}, in a layout", lambda folder, w=word: _in_layout(folder, w))
-    for what, run in _FILES.items():
-        yield Fault(
-            AREA, f"a module that a {what} names", lambda folder, r=run: _strange(folder, r)
-        )
-    for what, inside in _TEMPLATES.items():
-        yield Fault("xacro templates", what, lambda folder, i=inside: _template(folder, i))
+    yield from each(AREA, "a module that a {} names", _strange, _FILES)
+    yield from each("xacro templates", "{}", _template, _TEMPLATES)
     yield Fault("xacro templates", "in a layout", _template_in_layout)
     for what, inside in _GROUPS.items():
         text = f"<robot><group name='g'>{inside}</group></robot>"
@@ -46,16 +42,11 @@ _WORDS = {
     "a name that its module lacks": "strange:ARN",
     "a name of what is no robot": "strange:ARM",
     "a name without a module": ":ARM",
-    "a module without a name": "strange:",
     "a module by dots": "..strange:ARM",
-    "two colons": "strange:ARM:ARM",
     "a path to nothing": "nothing/there.urdf",
     "a path to a folder": "folder.urdf",
-    "a path to a FIFO": "pipe.urdf",
     "a path to /dev/zero": "zero.urdf",
     "a path with a NUL": "a\0.urdf",
-    "a path of 300 characters": "x" * 300 + ".urdf",
-    "a path of nobody's": "~nobody_here/arm.urdf",
     "an MJCF that is none": "text.xml",
 }
 
@@ -133,16 +124,10 @@ _TEMPLATES = {
     "an argument without a value": '<link name="$(arg nothing)"/>',
     "an unknown macro": "<xacro:nothing/>",
     "a macro of itself": '<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>',
-    "an include of itself": '<xacro:include filename="arm.urdf.xacro"/>',
     "an include that is not there": '<xacro:include filename="nothing.xacro"/>',
-    "a macro of a package that is not there": (
-        '<xacro:include filename="$(find nowhere)/m.xacro"/><xacro:m/>'
-    ),
     "an include of /etc/passwd": '<xacro:include filename="/etc/passwd"/>',
-    "an expression that divides by 0": '<link name="${1 / 0}"/>',
     "an expression that imports": "<link name=\"${__import__('os').getpid()}\"/>",
     "nothing that moves": '<xacro:property name="x" value="1"/><link name="l"/>',
-    "half of an expression": '<link name="${1 +"/>',
 }
 
 
@@ -162,11 +147,8 @@ def _template_in_layout(folder: Path) -> None:
 
 _GROUPS = {
     "an entity": "&x;",
-    "half of it": "</group></rob",
     "a group of an unknown link": "<chain base_link='base' tip_link='no'/>",
-    "a group of an unknown joint": "<joint name='no'/>",
     "a group of itself": "<group name='g'/>",
-    "a group of an unknown group": "<group name='no'/>",
     "a state that is no number": (
         "<joint name='arm_joint1'/></group>"
         "<group_state name='home' group='g'><joint name='arm_joint1' value='up'/></group_state>"

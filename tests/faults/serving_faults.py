@@ -23,7 +23,7 @@ from robot_layouts.data.serving.server import Admission
 from robot_layouts.data.serving.server import serve as serve_task
 from robots import RobotLayoutsError
 from tests.data.policy_server import pack, unpack
-from tests.faults.fault import GOES_ON, Fault, run_command
+from tests.faults.fault import GOES_ON, Fault, each, run_command
 from tests.faults.policy_servers_faults import BYTES, TEXTS, array, server
 
 AREA = "serving"
@@ -79,22 +79,15 @@ def faults() -> Iterator[Fault]:
         **CALLS,
     }
     sent: dict[str, bytes | str] = {w: pack(m) for w, m in messages.items()}
-    for what, data in {**sent, **BYTES, **TEXTS}.items():
-        yield Fault(AREA, f"a client sends {what}", functools.partial(_answered, data=data))
-    for what, change in ADDRESSES.items():
-        yield Fault(AREA, f"a client comes {what}", functools.partial(_not_let_in, change=change))
-    for what, do in VISITS.items():
-        yield Fault(AREA, f"a client {what}", functools.partial(_others_go_on, do=do), GOES_ON)
+    yield from each(AREA, "a client sends {}", _answered, {**sent, **BYTES, **TEXTS})
+    yield from each(AREA, "a client comes {}", _not_let_in, ADDRESSES)
+    yield from each(AREA, "a client {}", _others_go_on, VISITS, GOES_ON)
     yield Fault(AREA, "a web page connects", _web_page)
     yield Fault(AREA, "a client more than the server takes", _one_too_many)
-    for what, words in COMMANDS.items():
-        yield Fault(AREA, what, functools.partial(_command, words=words))
+    yield from each(AREA, "{}", _command, COMMANDS)
     yield Fault(AREA, "its port is taken", _taken)
     first = {what: pack(message) for what, message in METADATA.items()} | BYTES | TEXTS
-    for what, message in first.items():
-        yield Fault(
-            AREA, f"a server greets with {what}", functools.partial(_greeted, first=message)
-        )
+    yield from each(AREA, "a server greets with {}", _greeted, first)
     for what, message in {**BYTES, **TEXTS, **{w: pack(m) for w, m in ANSWERS.items()}}.items():
         run = functools.partial(_greeted, first=pack(GREETING), answer=message)
         yield Fault(AREA, f"a server answers {what}", run)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from layouts import Layout, ring, side_by_side
 from robots import LayoutError
-from tests.faults.fault import GOES_ON, Fault
+from tests.faults.fault import GOES_ON, Fault, each
 
 AREA = "layout files"
 
@@ -86,8 +86,7 @@ def faults() -> Iterator[Fault]:
             yield _fault(f"{what} is {_shortened(value)}", text.format(value))
     for what, text in _TEXTS.items():
         yield _fault(what, text)
-    for what, place in _NO_FILES.items():
-        yield Fault(AREA, f"the file is {what}", lambda folder, p=place: _load(folder, p))
+    yield from each(AREA, "the file is {}", _load, _NO_FILES)
     for what, value in (("None", None), ("bytes", GOOD.encode()), ("a list", [GOOD]), ("5", 5)):
         yield Fault(AREA, f"the text is {what}", lambda folder, v=value: _from(v))
     for what, run in _RIGHT.items():
