@@ -31,10 +31,10 @@ def _deaths() -> Iterator[Fault]:
         run = functools.partial(_plays_again, f"signal {name}")
         yield Fault(AREA, f"an episode gets {name}", run, GOES_ON)
     yield Fault(AREA, "an episode is stopped for a while", _naps, GOES_ON)
-    for what in ("exit 0", "exit 3", "busy", "lock", "sleep", "fifo", "half an answer"):
+    for what in ("exit 0", "busy", "lock", "fifo", "half an answer"):
         run = functools.partial(_plays_again, what)
         yield Fault(AREA, f"an episode's end: {what}", run, GOES_ON)
-    for what in ("signal SIGKILL", "exit 5", "sleep", "signal SIGSTOP"):
+    for what in ("signal SIGKILL", "exit 5", "sleep"):
         run = functools.partial(_gives_up, what, during="play")
         yield Fault(AREA, f"every worker at one seed: {what}", run)
     for what in ("signal SIGKILL", "exit 5"):
@@ -100,16 +100,6 @@ _PROGRAMS = {
         _OPENING + "\nplay()\n",
         GOES_ON,
     ),
-    "a daemonic process plays": (
-        _OPENING
-        + """
-if __name__ == "__main__":
-    process = multiprocessing.get_context("fork").Process(target=play, daemon=True)
-    process.start()
-    process.join()
-""",
-        GOES_ON,
-    ),
     "no file can be opened any more": (
         _OPENING
         + """
@@ -120,17 +110,6 @@ if __name__ == "__main__":
     play()
 """,
         "one clear error",
-    ),
-    "Python cannot be started any more once workers have played": (
-        _OPENING
-        + """
-if __name__ == "__main__":
-    list(ProcessExecutor(1).run(Play(), [0]))
-    sys.executable = "/no/such/python"
-    multiprocessing.set_executable("/no/such/python")
-    play()
-""",
-        GOES_ON,
     ),
     "the program is stopped for longer than an episode may take": (
         _OPENING

@@ -6,7 +6,6 @@ import atexit
 import functools
 import os
 import socket
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,9 +33,8 @@ def faults() -> Iterator[Fault]:
 
 
 NO_ADDRESS = (
-    *("", " ", "local", "head", "head:", ":6379", "head:0", "head:-1", "head:99999", "head:6379x"),
-    *("ray://head:10001", "http://head:6379", "a b:6379", "::1:6379", "[]:6379", "head:6379\n"),
-    *(None, 6379, True, ("head", 6379), b"head:6379"),
+    *("", "local", "head", "head:", ":6379", "head:0", "head:99999", "head:6379x"),
+    *("ray://head:10001", "a b:6379", "[]:6379", "head:6379\n", None, 6379, ("head", 6379)),
 )
 SILENT_SECONDS = 2.0  # that a cluster may take to answer here
 
@@ -44,8 +42,7 @@ SILENT_SECONDS = 2.0  # that a cluster may take to answer here
 def _wrong_addresses() -> Iterator[Fault]:
     for value in NO_ADDRESS:
         yield fault_of(f"RayExecutor({value!r})", ray_executor, address=value)
-    for host in ("127.0.0.1", "127.0.0.77", "localhost", "[::1]"):
-        yield Fault(AREA, f"{host}:1, which refuses", lambda folder, host=host: _join(f"{host}:1"))
+    yield Fault(AREA, "a port that refuses", lambda folder: _join("127.0.0.77:1"))
     yield Fault(AREA, "a host that does not exist", lambda folder: _join("no-such.invalid:6379"))
     yield Fault(AREA, "RAY_ADDRESS names a port that refuses", _stale_environment)
     for what, answer in (
@@ -55,7 +52,6 @@ def _wrong_addresses() -> Iterator[Fault]:
     ):
         run = functools.partial(_port_that_is_no_head, answer)
         yield Fault(AREA, f"a port that accepts and {what}", run)
-    yield Fault(AREA, "ray is not installed", _without_ray)
 
 
 # -- actors ---------------------------------------------------------------------------------------
@@ -136,8 +132,3 @@ def _answering_port(answer: bytes) -> Iterator[int]:
         threading.Thread(target=serve, daemon=True).start()
         yield server.getsockname()[1]
         server.shutdown(socket.SHUT_RDWR)
-
-
-def _without_ray(folder: Path) -> None:
-    with patch.dict(sys.modules, {"ray": None}):
-        ray_executor()

@@ -7,27 +7,21 @@ from pathlib import Path
 
 from layouts.viewer.page import save_html, serve
 from tests.faults.fault import Fault
-from tests.faults.served_page import cell, served
+from tests.faults.served_page import cell
 
 AREA = "pages"
 BAD_PLACES = {
     "an empty host": ("", 0),
     "a host that nobody has": ("nowhere.invalid", 0),
     "another machine's address": ("192.0.2.1", 0),
-    "a host in brackets": ("[::1]", 0),
-    "a host with its port": ("127.0.0.1:8080", 0),
-    "an address of a page as host": ("http://127.0.0.1", 0),
     "a host of 300 letters": ("a" * 300, 0),
     "a host with a zero byte": ("a\0b", 0),
-    "a host with an empty label": ("a..b", 0),
-    "a host with a space": ("local host", 0),
     "port -1": ("127.0.0.1", -1),
     "port 65536": ("127.0.0.1", 65536),
-    "port 1e9": ("127.0.0.1", 10**9),
 }
 BAD_FILES = (
-    "", "page", "page.pdf", "page.html.txt", ".html", "folder.html", "file/page.html", "n\0.html",
-    "a" * 300 + ".html", "/proc/page.html", "/dev/null/page.html", "page.\udcff",
+    "", "page.pdf", ".html", "folder.html", "file/page.html", "n\0.html", "/proc/page.html",
+    "a" * 300 + ".html",
 )  # fmt: skip
 
 
@@ -35,35 +29,12 @@ def faults() -> Iterator[Fault]:
     """Go through the addresses and files."""
     for what, (host, port) in BAD_PLACES.items():
         yield Fault(AREA, f"served at {what}", lambda _, at=(host, port): _serve(*at))
-    yield Fault(AREA, "served at a port in use", _serve_at_a_port_in_use)
-    yield Fault(AREA, "served by a viser that nobody guards", _serve_unguarded)
     for name in BAD_FILES:
         yield Fault(AREA, f"saved as {name[:20]!r}", lambda folder, name=name: _save(folder, name))
 
 
 def _serve(host: str, port: int) -> None:
     serve(cell(), host, port, lambda line: None)
-
-
-def _serve_at_a_port_in_use(_: Path) -> None:
-    _serve("127.0.0.1", served().port)
-
-
-def _serve_unguarded(_: Path) -> None:
-    from types import SimpleNamespace
-
-    import viser.infra._infra as viser_infra
-    import websockets.asyncio.server
-
-    real = viser_infra.websockets
-    own = SimpleNamespace(**vars(websockets.asyncio.server))
-    viser_infra.websockets = SimpleNamespace(
-        **{**vars(real), "asyncio": SimpleNamespace(server=own)}
-    )
-    try:
-        _serve("127.0.0.1", 0)
-    finally:
-        viser_infra.websockets = real
 
 
 def _save(folder: Path, name: str) -> None:

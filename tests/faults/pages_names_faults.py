@@ -8,16 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from layouts import single
-from layouts.viewer import ShownCell
 from layouts.viewer.page import NO_SLIDERS, save_html
 from layouts.viewer.text import as_html, printable
 from tests.faults.fault import GOES_ON, REFUSED, Fault, run_command
-from tests.layouts.guests import Guest, named_robot, site, small_cell
+from tests.layouts.guests import Guest, site, small_cell
 from tests.layouts.hostile_names import HOSTILE_NAMES
 
 AREA = "pages"
 NAMES = (*HOSTILE_NAMES, "a" * 10_000)
-ROBOTS = ("floor", "things", "tables", "WorldAxes", "label", "__proto__", "constructor", "ロボ")
 
 
 def faults() -> Iterator[Fault]:
@@ -30,10 +28,6 @@ def faults() -> Iterator[Fault]:
             yield Fault(AREA, what, lambda f, n=name, place=place: _name(f, place, n), promise)
         what = f"a saved page of names such as {name[:40]!r}"
         yield Fault(AREA, what, lambda folder, name=name: _saved_name(folder, name), in_urdf)
-    for name in ROBOTS:
-        what = f"a robot called {name!r}"
-        yield Fault(AREA, what, lambda folder, name=name: _robot(folder, name), GOES_ON)
-    yield Fault(AREA, "two links whose names are paths", _paths, GOES_ON)
     for name in ("<img src=x onerror=alert(1)>.yaml", "b\udcff\x1b[31m.yaml"):
         what = f"a layout's file called {name!r}"
         yield Fault(AREA, what, lambda folder, name=name: _file(folder, name), GOES_ON)
@@ -93,21 +87,6 @@ def _saved_name(folder: Path, name: str) -> str:
     assert NO_SLIDERS in page.text
     assert f"in arm.{printable(name)}, " in page.text
     return "it has the same tags as a page of harmless names"
-
-
-def _robot(folder: Path, name: str) -> str:
-    with site(ShownCell("cell", single({name: named_robot(folder)}))) as running:
-        nodes = running.server.scene._handle_from_node_name
-        assert type(nodes["/(floor)"]).__name__ == "GridHandle"
-        assert {f"/{name}/collision/{link}" for link in ("base", "upper", "lower")} <= set(nodes)
-    return "the scene is whole"
-
-
-def _paths(folder: Path) -> str:
-    with site(small_cell(folder, upper="a", lower="a/b")) as running:
-        nodes = running.server.scene._handle_from_node_name
-        assert {"/arm/collision/a", "/arm/collision/a%2Fb"} <= set(nodes)
-    return "each link is a node of its own"
 
 
 def _file(folder: Path, name: str) -> str:

@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from layouts import Layout, Placement
-from robot_layouts.data import evaluate
 from robots import RobotLayoutsError
 from tests.faults.fault import GOES_ON, Fault, run_command
 from tests.faults.players import recorded
@@ -35,7 +34,6 @@ def faults() -> Iterator[Fault]:
         run = functools.partial(_in_a_fork, workers)
         yield Fault(AREA, f"a fork records with {workers} workers", run, GOES_ON)
     yield Fault(AREA, "threads record into one folder", _into_one_folder)
-    yield Fault(AREA, "threads evaluate", _evaluate, GOES_ON)
     yield Fault(AREA, "threads export to one file", _export, GOES_ON)
     yield Fault(AREA, "a fork while another thread checks", _fork_beside, GOES_ON)
     what = f"{', '.join(HOMES)} may not be written"
@@ -115,11 +113,6 @@ def _into_one_folder(folder: Path) -> None:
     recorded((0, 1), folder / "alone")
     assert _bytes(folder / "out") == _bytes(folder / "alone")
     raise errors[0]
-
-
-def _evaluate(_: Path) -> None:
-    calls = [lambda w=w: evaluate("expert", "PushCube-v1", (0,), workers=w) for w in (0, 1)]
-    assert not _all(*calls)
 
 
 def _export(folder: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import resource
 import signal
 from collections.abc import Callable, Iterator
@@ -17,7 +16,7 @@ import tasks
 from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.data.teleop.session import Session
-from robots import RecordingError, TaskError
+from robots import RecordingError
 from tests.faults.fault import GOES_ON, Fault
 
 AREA = "teleoperation"
@@ -41,24 +40,12 @@ def _raises(error: BaseException) -> Callable[[Any], Any]:
     return policy
 
 
-ASKED: dict[str, Callable[[Session], object]] = {
-    "an arm that there is not": lambda session: session.aim("left", HOME),
-    "a place that is no number": lambda session: session.aim("arm", (math.nan, *HOME[1:])),
-    "a pose without a quaternion": lambda session: session.aim("arm", HOME[:3]),
-    "a quaternion of length 2": lambda session: session.aim("arm", (*HOME[:3], 0, 2, 0, 0)),
-    "a move without end": lambda session: session.shift("arm", (math.inf, 0, 0)),
-    "a step that was not taken": lambda session: session.undo(3),
-    "an episode without steps to be kept": lambda session: session.keep(),
-    "a policy where there is none": lambda session: session.give_back(),
-}
 POLICIES: dict[str, Any] = {
     "raises": _raises(KeyError("layer9")),
     "ends the program": _raises(SystemExit("enough")),
     "returns nothing": lambda observation: None,
     "returns too few numbers": lambda observation: np.zeros(7),
-    "returns what is no number": lambda observation: np.full(8, math.nan),
     "returns rows of different lengths": lambda observation: [[0.0], [0.0, 0.0]],
-    "is a class": Locked,
     "is no function": 5,
     "cannot be copied": Locked(),
 }
@@ -66,12 +53,9 @@ POLICIES: dict[str, Any] = {
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    for what, ask in ASKED.items():
-        yield Fault(AREA, f"people ask for {what}", partial(_asked, ask))
     for what, policy in POLICIES.items():
         yield Fault(AREA, f"a policy {what}", partial(_advised, policy))
     yield Fault(AREA, "a task of two environments", _two_environments)
-    yield Fault(AREA, "a policy raises in the middle of an episode", _goes_on, GOES_ON)
     yield Fault(AREA, "the disk is full when an episode is kept", _full_disk, GOES_ON)
     yield Fault(AREA, "an arm is to go a thousand kilometres away", _far, GOES_ON)
 
@@ -79,10 +63,6 @@ def faults() -> Iterator[Fault]:
 @cache
 def _task() -> tasks.TaskEnv:
     return tasks.make("PickCube-v1")
-
-
-def _asked(ask: Callable[[Session], object], folder: Path) -> None:
-    ask(Session(_task()))
 
 
 def _advised(policy: Any, folder: Path) -> None:
@@ -95,28 +75,6 @@ def _advised(policy: Any, folder: Path) -> None:
 
 def _two_environments(folder: Path) -> None:
     Session(tasks.make("PickCube-v1", num_envs=2))
-
-
-def _goes_on(folder: Path) -> None:
-    left = iter(range(3))
-
-    class Ends:
-        def __call__(self, observation: Any) -> Any:
-            next(left)
-            return np.zeros(8)
-
-    with Recorder(folder / FILE, _task()) as recorder:
-        session = Session(_task(), recorder, policy=Ends())
-        for _ in range(3):
-            session.step()
-        try:
-            session.step()
-        except TaskError:
-            session.take_over()
-        session.step()
-        session.keep()
-    with Recording(folder / FILE) as file:
-        assert [len(episode.actions) for episode in file] == [4]
 
 
 def _full_disk(folder: Path) -> str:
