@@ -24,7 +24,6 @@ from tests.robots.hub_server import page, status
 
 AREA = "hub"
 TASK, NAME = "PushT-v1", "lab/pushes"
-API = "/api/datasets/"
 GIT = ".gitattributes"  # which is there before anything is pushed
 SECONDS = 2  # for an answer
 

@@ -21,7 +21,6 @@ AREA = "suites"
 TASK, POLICY = "PushT-v1", "tests.data.policies:LEANS"
 HEAD = "name: x\nseeds: 0\ntasks:\n"
 SUITE = f"{HEAD}  - {{task: {TASK}, name: First}}\n  - {{task: {TASK}, name: Later, seeds: 1-2}}\n"
-ARM = "arm: {robot: panda_stick}"
 
 
 def faults() -> Iterator[Fault]:

@@ -7,7 +7,6 @@ import signal
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -23,16 +22,6 @@ AREA = "teleoperation"
 HOME = (0.0, 0.0, 0.3, 0.0, 1.0, 0.0, 0.0)
 
 
-class Locked:
-    """A policy that cannot be copied."""
-
-    def __init__(self) -> None:
-        self.lock = Lock()
-
-    def __call__(self, observation: Any) -> Any:
-        return np.zeros(8)
-
-
 def _raises(error: BaseException) -> Callable[[Any], Any]:
     def policy(observation: Any) -> Any:
         raise error
@@ -45,9 +34,7 @@ POLICIES: dict[str, Any] = {
     "ends the program": _raises(SystemExit("enough")),
     "returns nothing": lambda observation: None,
     "returns too few numbers": lambda observation: np.zeros(7),
-    "returns rows of different lengths": lambda observation: [[0.0], [0.0, 0.0]],
     "is no function": 5,
-    "cannot be copied": Locked(),
 }
 
 
@@ -55,7 +42,6 @@ def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
     for what, policy in POLICIES.items():
         yield Fault(AREA, f"a policy {what}", partial(_advised, policy))
-    yield Fault(AREA, "a task of two environments", _two_environments)
     yield Fault(AREA, "the disk is full when an episode is kept", _full_disk, GOES_ON)
     yield Fault(AREA, "an arm is to go a thousand kilometres away", _far, GOES_ON)
 
@@ -71,10 +57,6 @@ def _advised(policy: Any, folder: Path) -> None:
         session.step()
     finally:
         assert not session.actions
-
-
-def _two_environments(folder: Path) -> None:
-    Session(tasks.make("PickCube-v1", num_envs=2))
 
 
 def _full_disk(folder: Path) -> str:
