@@ -149,6 +149,10 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         with_tip(shape('<mesh filename="file://box.stl"/>')),
         ("the file 'file://box.stl' was found as 'box.stl'",),
     ),
+    "a package of another folder": (
+        with_tip(shape('<mesh filename="package://toy_package/meshes/box.stl"/>')),
+        ("the file 'package://toy_package/meshes/box.stl' was found as '../meshes/box.stl'",),
+    ),
     "a package beside": (
         with_tip(shape('<mesh filename="package://parts_package/meshes/ball.stl"/>')),
         (
@@ -234,6 +238,13 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         robot(ARM, link("map"), joint("floor", "map", "base", "", "floating")),
         (
             "joint 'floor', by which the whole robot is floating, is fixed: a layout says where it"
+            " stands",
+        ),
+    ),
+    "a planar base": (
+        robot(ARM, link("map"), joint("floor", "map", "base", "", "planar")),
+        (
+            "joint 'floor', by which the whole robot is planar, is fixed: a layout says where it"
             " stands",
         ),
     ),
