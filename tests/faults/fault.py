@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -15,6 +16,23 @@ REFUSED = "one clear error"
 GOES_ON = "goes on"
 
 COMMAND_SECONDS = 90.0
+
+
+def sparse(path: Path) -> None:
+    """Make a file of 5 GB of nothing."""
+    path.touch()
+    os.truncate(path, 5 << 30)
+
+
+NO_FILES: dict[str, Callable[[Path], object]] = {
+    "missing": lambda path: None,
+    "a folder": Path.mkdir,
+    "a FIFO": os.mkfifo,
+    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
+    "a link to itself": lambda path: path.symlink_to(path),
+    "5 GB of nothing": sparse,
+}
+"""What is put to a path at which there is no file to read then."""
 
 
 @dataclass(frozen=True)

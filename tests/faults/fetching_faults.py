@@ -18,7 +18,7 @@ from robots.assets import sources
 from robots.assets.packages import MANI_SKILL
 from robots.assets.sources import HubSource, PackageWheel
 from robots.assets.store import AssetStore
-from tests.faults.fault import GOES_ON, REFUSED, Fault
+from tests.faults.fault import GOES_ON, REFUSED, Fault, sparse
 from tests.faults.tiny_files import (
     CONTENTS,
     MESH,
@@ -124,7 +124,9 @@ def faults() -> Iterator[Fault]:
     )
     yield Fault(AREA, "Hub redirects to another host that lies", partial(_elsewhere, right=False))
     yield Fault(AREA, "the Hub's cache has a FIFO", partial(_in_hub_cache, os.mkfifo), GOES_ON)
-    yield Fault(AREA, "the Hub's cache has ten terabytes", partial(_in_hub_cache, _sparse), GOES_ON)
+    yield Fault(
+        AREA, "the Hub's cache has 5 GB", partial(_in_hub_cache, sparse), GOES_ON
+    )
     yield Fault(AREA, "the Hub's cache has other bytes", partial(_in_hub_cache, _other), GOES_ON)
     yield from _of_wheel()
 
@@ -196,11 +198,6 @@ def _in_hub_cache(put: Callable[[Path], object], folder: Path) -> None:
         put(blob)
         shutil.rmtree(store.root)
         fetch(store, [HubSource()])
-
-
-def _sparse(path: Path) -> None:
-    path.touch()
-    os.truncate(path, 10**13)
 
 
 def _other(path: Path) -> None:

@@ -15,7 +15,7 @@ from robot_layouts.core.paths import default_root
 from robots.assets.fetching import ensure
 from robots.assets.sources import LocalCopy
 from robots.assets.store import AssetStore, FileState
-from tests.faults.fault import GOES_ON, Fault
+from tests.faults.fault import GOES_ON, Fault, sparse
 from tests.faults.tiny_files import (
     CONTENTS,
     FILES,
@@ -32,18 +32,13 @@ AREA = "fetching"
 RIGHT = CONTENTS[MESH.path]
 
 
-def _sparse(path: Path) -> None:
-    path.touch()
-    os.truncate(path, 10**13)
-
-
 # What stands in place of a mesh, and what a local copy with it as a source says.
 IN_PLACE: dict[str, Callable[[Path], object]] = {
     "a FIFO": os.mkfifo,
     "a link to itself": lambda path: path.symlink_to(path),
     "a link to /dev/zero": lambda path: path.symlink_to("/dev/zero"),
     "a link to a directory": lambda path: path.symlink_to("/tmp"),
-    "ten terabytes of nothing": _sparse,
+    "5 GB of nothing": sparse,
     "half of it": lambda path: path.write_bytes(RIGHT[: len(RIGHT) // 2]),
     "one bit turned": lambda path: path.write_bytes(bytes([RIGHT[0] ^ 1]) + RIGHT[1:]),
 }

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from robots import RobotDescriptor
-from tests.faults.fault import GOES_ON, Fault, each
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
 from tests.robots.mjcf_parts import arm, mjcf
 
 AREA = "MJCFs"
@@ -48,11 +47,7 @@ _TEXTS = {
     ),
 }
 _FILES: dict[str, Callable[[Path], object]] = {
-    "not there": lambda path: None,
-    "a folder": Path.mkdir,
-    "a FIFO": os.mkfifo,
-    "a link to /dev/zero": lambda path: path.symlink_to("/dev/zero"),
-    "5 GB of nothing": lambda path: (path.touch(), os.truncate(path, 5 << 30)),
+    **NO_FILES,
     "bytes that are no text": lambda path: path.write_bytes(bytes(range(256))),
 }
 _NUMBERS = {

@@ -133,64 +133,37 @@ def _answers(*messages: bytes | str) -> Behaviour:
     return behave
 
 
-def _greets(message: bytes | str) -> Behaviour:
+def _greets(*first: bytes | str, answers: int = 1) -> Behaviour:
+    """Return a server that greets with some messages, and gives each question so many answers."""
+
     def behave(client: ServerConnection) -> None:
-        client.send(message)
+        for message in first:
+            client.send(message)
         for _ in client:
-            client.send(pack(GOOD))
+            for _ in range(answers):
+                client.send(pack(GOOD))
 
     return behave
-
-
-def _greets_twice(client: ServerConnection) -> None:
-    client.send(pack({}))
-    client.send(pack(GOOD))
-    for _ in client:
-        client.send(pack(GOOD))
-
-
-def _answers_twice(client: ServerConnection) -> None:
-    client.send(pack({}))
-    for _ in client:
-        client.send(pack(GOOD))
-        client.send(pack(GOOD))
-
-
-def _silent(client: ServerConnection) -> None:
-    client.send(pack({}))
-    for _ in client:
-        pass
 
 
 def _closes_at_once(client: ServerConnection) -> None:
     client.close(1013, "try again later")
 
 
-def _drops(client: ServerConnection) -> None:
-    """Cut the line in the middle of an answer."""
-    client.send(pack({}))
-    client.recv()
-    client.socket.sendall(b"\x82\x7e\x10\x00" + b"\x81")
-    client.socket.shutdown(socket.SHUT_RDWR)
+def _answers_raw(data: bytes, ends: bool = False) -> Behaviour:
+    """Return a server that sends bytes that are no whole message, and waits or cuts the line."""
 
-
-def _stalls(client: ServerConnection) -> None:
-    """Begin an answer, and never end it."""
-    client.send(pack({}))
-    client.recv()
-    client.socket.sendall(b"\x82\x7e\x10\x00" + b"\x81")
-    with suppress(ConnectionClosed):
+    def behave(client: ServerConnection) -> None:
+        client.send(pack({}))
         client.recv()
+        with suppress(OSError):
+            client.socket.sendall(data)
+        if ends:
+            client.socket.shutdown(socket.SHUT_RDWR)
+        with suppress(ConnectionClosed):
+            client.recv()
 
-
-def _huge(client: ServerConnection) -> None:
-    """Announce a message of a gigabyte, and begin it."""
-    client.send(pack({}))
-    client.recv()
-    with suppress(OSError):
-        client.socket.sendall(b"\x82\x7f" + struct.pack(">Q", 2**30) + bytes(2**20))
-    with suppress(ConnectionClosed):
-        client.recv()
+    return behave
 
 
 def _fragments(client: ServerConnection) -> None:
@@ -201,15 +174,17 @@ def _fragments(client: ServerConnection) -> None:
         client.send(bytes(2**20) for _ in range(200))
 
 
+HALF = b"\x82\x7e\x10\x00\x81"  # the beginning of a message of 4,096 bytes
+GIGABYTE = b"\x82\x7f" + struct.pack(">Q", 2**30) + bytes(2**20)
 BEHAVIOURS: dict[str, Behaviour] = {
-    "it is silent": _silent,
+    "it is silent": _greets(pack({}), answers=0),
     "it closes the connection at once": _closes_at_once,
-    "it drops the line in the middle of an answer": _drops,
-    "it stops in the middle of an answer": _stalls,
-    "it sends a message of a gigabyte": _huge,
+    "it drops the line in the middle of an answer": _answers_raw(HALF, ends=True),
+    "it stops in the middle of an answer": _answers_raw(HALF),
+    "it sends a message of a gigabyte": _answers_raw(GIGABYTE),
     "it sends 200 MB in fragments": _fragments,
-    "it answers before it is asked": _greets_twice,
-    "it answers twice": _answers_twice,
+    "it answers before it is asked": _greets(pack({}), pack(GOOD)),
+    "it answers twice": _greets(pack({}), answers=2),
 }
 
 

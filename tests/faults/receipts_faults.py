@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import json
-import os
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -15,7 +14,7 @@ from typing import Any
 
 from robot_layouts.data import evaluate
 from robot_layouts.data.receipts import Receipt, ReceiptError, verify
-from tests.faults.fault import GOES_ON, Fault, each
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
 from tests.faults.strangers import lay_bait, runs_nothing
 
 AREA = "receipts"
@@ -245,18 +244,8 @@ def _text(change: Callable[[str], str]) -> Callable[[Path], object]:
     return lambda path: path.write_text(change(contents()))
 
 
-def _sparse(path: Path) -> None:
-    path.touch()
-    os.truncate(path, 5 << 30)
-
-
 _FILES: dict[str, Callable[[Path], object]] = {
-    "missing": lambda path: None,
-    "a folder": Path.mkdir,
-    "a FIFO": os.mkfifo,
-    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
-    "a link to itself": lambda path: path.symlink_to(path),
-    "5 GB of nothing": _sparse,
+    **NO_FILES,
     "empty": Path.touch,
     "half": _text(lambda text: text[: len(text) // 2]),
     "two receipts": _text(lambda text: text * 2),

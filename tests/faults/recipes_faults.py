@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from robot_layouts.data.playing.command_options import Players
 from robot_layouts.data.recipes.build import build_command, recipe_command
 from robots import RobotLayoutsError
 from tests.data.recordings import record
-from tests.faults.fault import GOES_ON, Fault, each
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
 from tests.faults.strangers import lay_bait, runs_nothing
 
 AREA = "recipes"
@@ -104,7 +103,7 @@ def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
     yield from each(AREA, "{}", _build, {**_FIELDS, **_NAMES, **_SEEDS, **_BOMBS})
     yield from each(AREA, "{}", _runs_nothing, _GADGETS)
-    yield from each(AREA, "the file is {}", _build_of, _FILES)
+    yield from each(AREA, "the file is {}", _build_of, NO_FILES)
     for what, run in _BUILDS.items():
         yield Fault(AREA, what, run)
     for what, run in _RECIPES_OF.items():
@@ -137,15 +136,6 @@ def _build(folder: Path, text: str) -> None:
 def _build_of(folder: Path, make: Callable[[Path], object]) -> None:
     make(folder / "recipe.yaml")
     _make(folder)
-
-
-_FILES: dict[str, Callable[[Path], object]] = {
-    "missing": lambda path: None,
-    "a folder": Path.mkdir,
-    "a FIFO": os.mkfifo,
-    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
-    "a link to itself": lambda path: path.symlink_to(path),
-}
 
 
 def _runs_nothing(folder: Path, text: str) -> None:

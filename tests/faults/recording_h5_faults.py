@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from tests.faults.fault import GOES_ON, Fault, each
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
 from tests.faults.recording_files import (
     AREA,
     BODY,
@@ -203,11 +202,7 @@ def _endless_texts(content: bytes) -> bytes:
 
 
 _FILES: dict[str, Callable[[Path], None]] = {
-    "missing": lambda path: path.unlink(),
-    "a directory": _put(lambda path: path.mkdir()),
-    "a FIFO": _put(os.mkfifo),
-    "/dev/zero": _put(lambda path: path.symlink_to("/dev/zero")),
-    "a link to itself": _put(lambda path: path.symlink_to(path)),
+    **{what: _put(make) for what, make in NO_FILES.items()},
     "empty": _write(lambda content: b""),
     "a text": _write(lambda content: b"not even h5"),
     **{

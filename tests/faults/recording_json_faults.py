@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 
 from robot_layouts.data.playing.replay import open_recording
 from robot_layouts.data.reading.recorded_task import task_for
-from tests.faults.fault import GOES_ON, Fault, each
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
 from tests.faults.recording_files import (
     AREA,
     contents,
@@ -94,18 +93,8 @@ def _bytes(make: Callable[[bytes], bytes]) -> Callable[[Path], Any]:
     return lambda path: path.write_bytes(make(contents()[1]))
 
 
-def _large(path: Path) -> None:
-    with path.open("wb") as file:
-        file.truncate(2**40)  # a terabyte of nothing
-
-
 _FILES: dict[str, Callable[[Path], Any]] = {
-    "missing": lambda path: None,
-    "a directory": lambda path: path.mkdir(),
-    "a FIFO": os.mkfifo,
-    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
-    "a link to itself": lambda path: path.symlink_to(path.name),
-    "a terabyte": _large,
+    **NO_FILES,
     "empty": _bytes(lambda content: b""),
     "cut in half": _bytes(lambda content: content[: len(content) // 2]),
     "UTF-16": _bytes(lambda content: content.decode().encode("utf-16")),

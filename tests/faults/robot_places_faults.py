@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
 from layouts.visuals import read_visuals
 from robots import LocalUrdf
-from tests.faults.fault import GOES_ON, Fault
+from tests.faults.fault import GOES_ON, NO_FILES, Fault
 from tests.faults.toy_robots import (
     BOX,
     LIMIT,
@@ -24,7 +23,7 @@ AREA = "robot files"
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults of files and places."""
-    for what, place in _NO_FILES.items():
+    for what, place in list(NO_FILES.items())[1:]:
         for file in ("toy.urdf", "toy.srdf", "arm.stl"):
             yield Fault(AREA, f"{file} is {what}", lambda f, p=place, n=file: _no_file(f, p, n))
     for reference in _OUTSIDE:
@@ -35,23 +34,6 @@ def faults() -> Iterator[Fault]:
     for what, run in _RIGHT.items():
         yield Fault(AREA, what, run, GOES_ON)
 
-
-def _sparse(path: Path) -> None:
-    path.touch()
-    os.truncate(path, 5 << 30)
-
-
-def _link_to(target: str) -> Callable[[Path], None]:
-    return lambda path: path.symlink_to(target)
-
-
-_NO_FILES: dict[str, Callable[[Path], None]] = {
-    "a link to /dev/zero": _link_to("/dev/zero"),
-    "a FIFO": os.mkfifo,
-    "a folder": Path.mkdir,
-    "5 GB of nothing": _sparse,
-    "a link to itself": lambda path: path.symlink_to(path),
-}
 
 _OUTSIDE = (
     "../../../../../../../../etc/passwd",

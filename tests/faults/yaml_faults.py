@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from layouts import Layout, ring, side_by_side
 from robots import LayoutError
-from tests.faults.fault import GOES_ON, Fault, each
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
 
 AREA = "layout files"
 
@@ -129,23 +128,9 @@ _TEXTS = {
 }
 
 
-def _link(target: str) -> Callable[[Path], object]:
-    return lambda path: path.symlink_to(target)
-
-
-def _sparse(path: Path) -> None:
-    path.touch()
-    os.truncate(path, 5 << 30)
-
-
 _NO_FILES: dict[str, Callable[[Path], object]] = {
-    "missing": lambda path: None,
-    "a folder": Path.mkdir,
-    "a FIFO": os.mkfifo,
-    "/dev/zero": _link("/dev/zero"),
-    "/proc/self/mem": _link("/proc/self/mem"),
-    "a link to itself": lambda path: path.symlink_to(path),
-    "5 GB of nothing": _sparse,
+    **NO_FILES,
+    "/proc/self/mem": lambda path: path.symlink_to("/proc/self/mem"),
     "not UTF-8": lambda path: path.write_bytes(GOOD.encode().replace(b"left", b"l\xffft")),
     "UTF-16": lambda path: path.write_bytes(GOOD.encode("utf-16")),
     "random bytes": lambda path: path.write_bytes(bytes(range(256)) * 10),
