@@ -289,13 +289,9 @@ def test_a_task_may_say_its_own_instruction():
     ("options", "complaint"),
     [
         ({"depth": True}, "depth is of no use without cameras"),
-        ({"size": (8, 8)}, "size is of no use without cameras"),
-        ({"images": True, "video": True}, "images is of no use without cameras"),
         ({"images": True, "video": True, "cameras": "all"}, "either a video or images"),
         ({"cameras": []}, "no camera is named"),
-        ({"cameras": [5]}, "their names are needed"),
         ({"cameras": "all", "size": (8, 0)}, "size is 0; it must be an integer from 1"),
-        ({"cameras": "all", "size": 8}, "size is 8; width and height"),
         ({"cameras": "all", "format": "robomimic", "images": True}, "has no images here"),
     ],
 )
@@ -342,19 +338,6 @@ def test_videos_have_even_sides(tmp_path):
     PictureWriter(tmp_path, channels, 20, FileLimits(), images=True)
 
 
-class Watched:
-    """Two processes, whose ids are kept."""
-
-    def __init__(self) -> None:
-        self.workers = set[int]()
-
-    def run(self, prepare, seeds):
-        for event in ProcessExecutor(2).run(prepare, seeds):
-            if event.worker.startswith("process "):
-                self.workers.add(int(event.worker.split()[1]))
-            yield event
-
-
 @dataclass
 class Struck:
     """Two processes, one of which dies while it draws."""
@@ -384,22 +367,6 @@ def test_it_does_not_matter_who_draws(recording, tmp_path, options):
         files.append(found)
     assert files[0] == files[1] == files[2]
     assert sum("another takes its place" in text for text in told) == 1
-
-
-@drawn
-@pytest.mark.long
-def test_whatever_ends_drawing_in_workers_leaves_nothing(recording, tmp_path):
-    def interrupt(done, total):
-        raise KeyboardInterrupt
-
-    executor = Watched()
-    wanted = Export(
-        recording, "robomimic", tmp_path / "out", cameras="all", size=SIZE, include_failures=True
-    )
-    with pytest.raises(KeyboardInterrupt):
-        export(wanted, interrupt, executor=executor)
-    assert list(tmp_path.iterdir()) == []
-    assert not any(Path(f"/proc/{worker}").exists() for worker in executor.workers)
 
 
 @drawn

@@ -166,7 +166,6 @@ def test_what_it_did_not_learn_is_refused(folder, changed, message):
     ("observed", "message"),
     [
         ([{"key": "extra/cube_pose"}], "observes 'extra/cube_pose', which is not observed here"),
-        ([{"key": "agent/qpos/x"}], "observes 'agent/qpos/x', which is not"),
         ([{"key": "agent/qpos"}], "observes 21 numbers; here are 9"),
     ],
 )
@@ -183,9 +182,7 @@ def test_what_is_not_observed_is_named(tmp_path, observed, message):
         ({"played": 0}, "played is 0"),
         ({"observed": [{"key": "a", "symmetry": "ball"}]}, "symmetry"),
         ({"width": 5}, "lack a tensor 'network.0.weight' of the shape \\[5, 21\\]"),
-        ({"blocks": 0}, "lack a tensor 'network.2.weight'"),
         ({"switches": [24]}, "its chunks have no number 24"),
-        ({"task": None}, "task"),
     ],
 )
 def test_a_declaration_that_is_none_is_refused(folder, changed, message):
@@ -246,16 +243,11 @@ def tensor(**changed: object) -> dict[str, object]:
         b"",
         (2**40).to_bytes(8, "little") + b"{}",
         of_header(b"{"),
-        of_header(b"\xff\xff"),
         of_header(b"[" * 5000),
-        of_header([1]),
         of_header({"a": tensor(dtype="F31")}),
         of_header({"a": tensor(shape=[3])}),
-        of_header({"a": tensor(shape=[-2])}),
-        of_header({"a": tensor(data_offsets=[0])}),
         of_header({"a": tensor(), "b": tensor()}),
         of_header({"a": tensor()}, bytes(4)),
-        of_header({"a": tensor()}, bytes(12)),
     ],
 )
 def test_a_file_that_is_no_safetensors_is_refused(tmp_path, content):

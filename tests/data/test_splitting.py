@@ -86,10 +86,9 @@ def test_what_fits_into_one_file_has_no_manifest(tmp_path, push_t):
     assert sorted(contents(path)) == ["trajectory.h5", "trajectory.json"]
 
 
-@pytest.mark.parametrize("shuffled", [1, 2, 3])
-def test_expected_episodes_may_come_in_any_order(tmp_path, push_t, straight, shuffled):
+def test_expected_episodes_may_come_in_any_order(tmp_path, push_t, straight):
     env, episodes = push_t
-    crooked = random.Random(shuffled).sample(episodes, COUNT)
+    crooked = random.Random(1).sample(episodes, COUNT)
     path = tmp_path / "trajectory.h5"
     with Recorder(path, env, file_size=SIZE) as recorder:
         recorder.expect(range(COUNT))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -66,6 +66,25 @@ def each(
     for name, value in values.items():
         tried = what.replace("{}", name)
         yield Fault(area, tried, lambda folder, value=value: run(folder, value), promise)
+
+
+def refused(
+    area: str, calls: Mapping[str, tuple[Callable[[Any], object], Iterable[Any]]]
+) -> Iterator[Fault]:
+    """Go through calls that must refuse each of some values, which is put into what is tried."""
+    for what, (call, values) in calls.items():
+        for value in values:
+            tried = what.replace("{}", shown(value))
+            yield Fault(area, tried, lambda folder, call=call, value=value: _call(call, value))
+
+
+def _call(call: Callable[[Any], object], value: Any) -> None:
+    call(value)
+
+
+def shown(value: Any) -> str:
+    """Return a value as it is written, in one short line."""
+    return " ".join(repr(value).replace(repr(10**400), "10**400").split())[:80]
 
 
 def run_command(

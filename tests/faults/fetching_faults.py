@@ -124,9 +124,7 @@ def faults() -> Iterator[Fault]:
     )
     yield Fault(AREA, "Hub redirects to another host that lies", partial(_elsewhere, right=False))
     yield Fault(AREA, "the Hub's cache has a FIFO", partial(_in_hub_cache, os.mkfifo), GOES_ON)
-    yield Fault(
-        AREA, "the Hub's cache has 5 GB", partial(_in_hub_cache, sparse), GOES_ON
-    )
+    yield Fault(AREA, "the Hub's cache has 5 GB", partial(_in_hub_cache, sparse), GOES_ON)
     yield Fault(AREA, "the Hub's cache has other bytes", partial(_in_hub_cache, _other), GOES_ON)
     yield from _of_wheel()
 
