@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -19,25 +18,10 @@ from robot_layouts.data.reading import hub as hub_reading
 from robot_layouts.data.reading.hub import HubError, local_place
 from robot_layouts.data.reading.recording import Recording
 from tests.data.recordings import record
-from tests.data.writable_hub import TOKEN, WritableHub
+from tests.data.writable_hub import TOKEN
 from tests.robots.hub_server import page, status
 
 TASK, NAME = "PushT-v1", "lab/pushes"
-SETTINGS = {"HF_HUB_DISABLE_XET": "1", "HF_TOKEN": TOKEN, "NO_PROXY": "127.0.0.1"}
-
-
-@pytest.fixture
-def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[WritableHub]:
-    from huggingface_hub import constants
-
-    hub_reading._downloaded.cache_clear()
-    monkeypatch.setattr(constants, "HF_HUB_CACHE", str(tmp_path / "hf_home/hub"))
-    monkeypatch.setattr(constants, "HF_HUB_DISABLE_XET", True)
-    with WritableHub({}) as server:
-        places = {"HF_HOME": str(tmp_path / "hf_home"), "HF_ENDPOINT": server.endpoint}
-        for name, value in (SETTINGS | places).items():
-            monkeypatch.setenv(name, value)
-        yield server
 
 
 @pytest.fixture(scope="module")

@@ -22,12 +22,12 @@ from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.reading.tensors import read_tensors, write_tensors
 from robot_layouts.data.receipts import Receipt, verify
 from robots import TaskError, UnreadableFileError
-from tests.data.writable_hub import TOKEN, WritableHub
+from tests.data.writable_hub import WritableHub
 
 TASK, NAME = "PushCube-v1", "lab/push"
 HOW = {"control_mode": "pd_joint_pos", "obs_mode": "state_dict", "workers": 0}
 WORDS = ["--control-mode", "pd_joint_pos", "--obs-mode", "state_dict", "--workers", "0"]
-SETTINGS = {"HF_HUB_DISABLE_XET": "1", "HF_TOKEN": TOKEN, "NO_PROXY": "127.0.0.1"}
+
 DECLARED = {
     "format": "robot-layouts policy 1",
     "task": TASK,
@@ -64,19 +64,6 @@ def network(seed: int = 0) -> dict[str, np.ndarray]:
 def folder(tmp_path: Path) -> Path:
     save_policy(tmp_path / "shared", DECLARED, network())
     return tmp_path / "shared"
-
-
-@pytest.fixture
-def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[WritableHub]:
-    from huggingface_hub import constants
-
-    monkeypatch.setattr(constants, "HF_HUB_CACHE", str(tmp_path / "hf_home/hub"))
-    monkeypatch.setattr(constants, "HF_HUB_DISABLE_XET", True)
-    with WritableHub({}) as server:
-        places = {"HF_HOME": str(tmp_path / "hf_home"), "HF_ENDPOINT": server.endpoint}
-        for name, value in (SETTINGS | places).items():
-            monkeypatch.setenv(name, value)
-        yield server
 
 
 def upload(hub: WritableHub, folder: Path) -> str:

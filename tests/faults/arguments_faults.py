@@ -1,4 +1,4 @@
-"""Wrong arguments of tasks: numbers that are none, names that do not exist, settings of physics."""
+"""Wrong arguments of tasks: numbers that are none, names that do not exist, cameras."""
 
 from __future__ import annotations
 

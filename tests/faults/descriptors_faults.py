@@ -1,4 +1,4 @@
-"""Robots that are declared wrongly, here or by another package."""
+"""Robots that are declared wrongly."""
 
 from __future__ import annotations
 

@@ -6,18 +6,17 @@ import functools
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from unittest import mock
 
 import pytest
 
 from robot_layouts.data.publishing.push import DatasetPush, Sharing
-from robot_layouts.data.reading import hub
 from robot_layouts.data.reading.recording import Recording
 from robots import RobotLayoutsError
 from tests.data.recordings import record
-from tests.data.writable_hub import TOKEN, WritableHub
+from tests.data.writable_hub import TOKEN, WritableHub, running_hub
 from tests.faults.fault import GOES_ON, Fault, each
 from tests.robots import hub_server
 from tests.robots.hub_server import page, status
@@ -129,29 +128,9 @@ def _recorded() -> Path:
     return folder
 
 
-@contextmanager
-def _hub(folder: Path) -> Iterator[WritableHub]:
-    """Run a Hub that a process with a token finds, and a cache of its own."""
-    from huggingface_hub import constants
-
-    hub._downloaded.cache_clear()
-    with WritableHub({}) as server, ExitStack() as stack:
-        settings = {
-            "HF_TOKEN": TOKEN,
-            "HF_HOME": str(folder / "hf_home"),
-            "HF_ENDPOINT": server.endpoint,
-            "NO_PROXY": "127.0.0.1",
-        }
-        stack.enter_context(mock.patch.dict("os.environ", settings))
-        changed = {
-            "HF_HUB_CACHE": str(folder / "hf_home/hub"),
-            "HF_HUB_DISABLE_XET": True,
-            "HF_HUB_DOWNLOAD_TIMEOUT": SECONDS,
-            "HF_HUB_ETAG_TIMEOUT": SECONDS,
-        }
-        for name, value in changed.items():
-            stack.enter_context(mock.patch.object(constants, name, value))
-        yield server
+def _hub(folder: Path) -> AbstractContextManager[WritableHub]:
+    waits = {"HF_HUB_DOWNLOAD_TIMEOUT": SECONDS, "HF_HUB_ETAG_TIMEOUT": SECONDS}
+    return running_hub(folder, **waits)
 
 
 def _push(folder: Path | None = None) -> str:

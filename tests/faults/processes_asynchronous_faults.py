@@ -1,4 +1,4 @@
-"""A vector whose environments are sent actions and received: misused, stopped, killed meanwhile."""
+"""A vector whose environments are sent actions and received: stopped or killed meanwhile."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands about recordings whose output nobody reads, which are killed, and what they leave."""
+"""Commands about recordings whose output nobody reads, or which find something in their way."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands of the room robots: wrong words, streams that are closed, Ctrl-C, odd places."""
+"""Commands of the room robots: wrong words, Ctrl-C, odd places."""
 
 from __future__ import annotations
 

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import partial
 from pathlib import Path
 
 from layouts.visuals import read_visuals
 from robots import LocalUrdf
-from tests.faults.fault import GOES_ON, NO_FILES, Fault
+from tests.faults.fault import NO_FILES, Fault
 from tests.faults.toy_robots import (
     BOX,
-    LIMIT,
     mesh,
     read_by_all,
     toy,
@@ -31,8 +29,6 @@ def faults() -> Iterator[Fault]:
     for reference in _OUTSIDE[:6]:
         yield Fault(AREA, f"visual mesh {reference}", lambda f, r=reference: _draw(f, r))
         yield Fault(AREA, f"texture {reference}", lambda f, r=reference: _paint(f, r))
-    for what, run in _RIGHT.items():
-        yield Fault(AREA, what, run, GOES_ON)
 
 
 _OUTSIDE = (
@@ -88,31 +84,3 @@ def _robot_beside(folder: Path, text: str) -> Path:
     write_mesh(urdf.parent.parent / "outside.stl")
     write_mesh(urdf.parent.parent / "robot_of_another" / "arm.stl")
     return urdf
-
-
-def _unused(folder: Path) -> str:
-    """What SAPIEN's parser stumbles over, and nobody needs."""
-    text = toy().replace(
-        "</robot>",
-        "<transmission><type>t</type></transmission><gazebo><sensor/></gazebo>"
-        '<gazebo reference="arm"><sensor type="camera"><camera/></sensor></gazebo></robot>',
-    )
-    text = text.replace(LIMIT, f"{LIMIT}<safety_controller/><calibration rising='x'/>", 1)
-    (folder / "toy.urdf").write_text(text)
-    read_by_all(folder / "toy.urdf")
-    return "left out"
-
-
-def _encoded(encoding: str, folder: Path) -> str:
-    text = f'<?xml version="1.0" encoding="{encoding}"?>{toy()}'
-    (folder / "toy.urdf").write_bytes(text.encode(encoding))
-    read_by_all(folder / "toy.urdf")
-    return "read as any other"
-
-
-_RIGHT: dict[str, Callable[[Path], str]] = {
-    "transmissions, sensors and calibrations": _unused,
-    "URDF in UTF-16": partial(_encoded, "utf-16"),
-    "URDF in UTF-8 with a byte order mark": partial(_encoded, "utf-8-sig"),
-    "URDF in Latin-1": partial(_encoded, "iso-8859-1"),
-}

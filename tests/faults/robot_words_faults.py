@@ -1,4 +1,4 @@
-"""Words for robots, in Python and in files, and the xacro templates and SRDFs that they lead to."""
+"""Words for robots, in Python and in files, and the xacro templates that they lead to."""
 
 from __future__ import annotations
 
@@ -11,10 +11,8 @@ from layouts import Layout, Placement, single
 from robot_layouts.data.suite.suite import read_layout
 from robot_layouts.motion import Motion
 from robots import RobotDescriptor
-from robots.named import named_robot
 from tests.experts.free_motions import swing
-from tests.faults.fault import GOES_ON, Fault, each
-from tests.robots.urdf_parts import Parts
+from tests.faults.fault import Fault, each
 
 AREA = "robot words"
 XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
@@ -28,11 +26,6 @@ def faults() -> Iterator[Fault]:
         yield Fault(AREA, f"{what}, in a layout", lambda folder, w=word: _in_layout(folder, w))
     yield from each(AREA, "a module that a {} names", _strange, _FILES)
     yield from each("xacro templates", "{}", _template, _TEMPLATES)
-    yield Fault("xacro templates", "in a layout", _template_in_layout)
-    for what, inside in _GROUPS.items():
-        text = f"<robot><group name='g'>{inside}</group></robot>"
-        yield Fault("SRDFs", what, lambda folder, t=text: _srdf(folder, t))
-    yield Fault(AREA, "a path in a layout", _right, GOES_ON)
 
 
 _WORDS = {
@@ -135,43 +128,3 @@ def _template(folder: Path, inside: str) -> None:
     path = folder / "arm.urdf.xacro"
     path.write_text(f'<robot name="arm" {XACRO}>{inside}</robot>', "utf-8")
     RobotDescriptor.from_urdf(path, quiet=True)
-
-
-def _template_in_layout(folder: Path) -> None:
-    urdf = _arm(folder).read_text()
-    spelt = urdf.replace("<robot", f"<robot {XACRO}", 1).replace('"0 0 0.1"', '"0 0 ${0.1}"')
-    (folder / "arm.urdf").write_text(spelt)
-    (folder / "cell.yaml").write_text("version: 1\nrobots: {a: {robot: arm.urdf}}\n")
-    Layout.load(folder / "cell.yaml")
-
-
-_GROUPS = {
-    "an entity": "&x;",
-    "a group of an unknown link": "<chain base_link='base' tip_link='no'/>",
-    "a group of itself": "<group name='g'/>",
-    "a state that is no number": (
-        "<joint name='arm_joint1'/></group>"
-        "<group_state name='home' group='g'><joint name='arm_joint1' value='up'/></group_state>"
-        "<group name='h'><joint name='arm_joint2'/>"
-    ),
-}
-
-
-def _srdf(folder: Path, text: str) -> None:
-    (folder / "given.srdf").write_text(text)
-    RobotDescriptor.from_urdf(_arm(folder), srdf=folder / "given.srdf", quiet=True)
-
-
-def _arm(folder: Path) -> Path:
-    parts = Parts()
-    parts.arm(parts.link("base"), "arm", "0 0 0.1")
-    return parts.write(folder)
-
-
-def _right(folder: Path) -> None:
-    (folder / "deep").mkdir()
-    _arm(folder)
-    layout = Layout({"a": Placement(named_robot(folder / "robot.urdf"))})
-    path = layout.save(folder / "deep" / "cell.yaml")
-    assert 'robot: "../robot.urdf"' in path.read_text()
-    assert Layout.load(path) == layout

@@ -1,4 +1,4 @@
-"""Suites of somebody else, and runs that are stopped, damaged or played twice at once."""
+"""Suites of somebody else, and runs that are damaged."""
 
 from __future__ import annotations
 

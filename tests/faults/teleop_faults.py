@@ -1,4 +1,4 @@
-"""Teleoperation: what people and policies ask of a session that it cannot do, and what it keeps."""
+"""Teleoperation: what policies ask of a session that it cannot do, and what it keeps."""
 
 from __future__ import annotations
 
