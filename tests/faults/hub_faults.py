@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
@@ -109,10 +108,6 @@ def faults() -> Iterator[Fault]:
         run = functools.partial(_elsewhere, address, push=True)
         yield Fault(AREA, f"pushing to an address {what}", run)
     yield from each(AREA, "it holds {}", _holds, CONTENTS)
-    yield from each(AREA, "pushing {}", _push_of, _FOLDERS)
-    for what, token in (("no token", ""), ("a token of two lines", "hf_a\nb")):
-        yield Fault(AREA, f"pushing with {what}", functools.partial(_with_token, token=token))
-    yield Fault(AREA, "a push that failed in the middle, and again", _goes_on, GOES_ON)
     yield Fault(AREA, "a name that would lead out of the cache", _escapes, GOES_ON)
 
 
@@ -133,8 +128,8 @@ def _hub(folder: Path) -> AbstractContextManager[WritableHub]:
     return running_hub(folder, **waits)
 
 
-def _push(folder: Path | None = None) -> str:
-    return DatasetPush.of(folder or _recorded(), NAME, Sharing())()
+def _push() -> str:
+    return DatasetPush.of(_recorded(), NAME, Sharing())()
 
 
 def _read(name: str = f"hub:{NAME}") -> int:
@@ -204,50 +199,6 @@ def _other_actions(data: bytes) -> bytes:
         with h5py.File(path, "r+") as file:
             file["traj_0/actions"][0, 0] += 0.5
         return path.read_bytes()
-
-
-def _push_of(folder: Path, make: Callable[[Path], object]) -> None:
-    make(folder / "data")
-    with _hub(folder) as hub:
-        try:
-            _push(folder / "data")
-        finally:
-            assert hub.requests == [], "something was sent"
-
-
-def _copied(path: Path, file: str = "", text: str = "") -> None:
-    shutil.copytree(_recorded(), path)
-    if file:
-        (path / file).parent.mkdir(exist_ok=True)
-        (path / file).write_text(text)
-
-
-_FOLDERS: dict[str, Callable[[Path], object]] = {
-    "nothing": lambda path: None,
-    "an empty folder": Path.mkdir,
-    "a link to itself": lambda path: path.symlink_to(path),
-    "a recording whose h5 file is a text": lambda path: _copied(path, "trajectory.h5", "x"),
-    "a recording that is being written": lambda path: _copied(path, "trajectory.parts/00001"),
-}
-
-
-def _with_token(folder: Path, token: str) -> None:
-    with _hub(folder), mock.patch.dict("os.environ", {"HF_TOKEN": token}):
-        _push()
-
-
-def _goes_on(folder: Path) -> str:
-    with _hub(folder) as hub:
-        hub.fail("POST", "/commit/", status(403), times=1)
-        try:
-            _push()
-        except RobotLayoutsError as error:
-            said = str(error)
-        commit = _push()
-        assert len(hub.uploads()) == 1, "what had arrived was sent again"
-        assert hub.repositories[NAME].head == commit
-        assert _read() == 1
-        return f"pushed at last, after: {said}"
 
 
 def _escapes(folder: Path) -> str:

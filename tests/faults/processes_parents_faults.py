@@ -27,14 +27,6 @@ from tests.faults.worker_processes import (
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    yield from _parents_that_end()
-    yield from _main_modules()
-
-
-# -- parents that end -----------------------------------------------------------------------------
-
-
-def _parents_that_end() -> Iterator[Fault]:
     for milliseconds in (0, 100, 400, 1600):
         what = f"a process is killed {milliseconds} ms after it began to start workers"
         yield Fault(AREA, what, lambda _, s=milliseconds / 1000: _parent_ends(s), GOES_ON)
@@ -48,6 +40,8 @@ def _parents_that_end() -> Iterator[Fault]:
     yield Fault(AREA, what, lambda _: _parent_ends(None, task_id="BusySteps-v1"), GOES_ON)
     what = "a process is killed that plays episodes in workers"
     yield Fault(AREA, what, lambda _: _parent_ends(None, hold="plays"), GOES_ON)
+    for what, (text, hint) in MAINS.items():
+        yield Fault(AREA, f"a script {what}", partial(_run_main, text, hint))
 
 
 def _parent_ends(
@@ -162,11 +156,6 @@ MAINS = {
         "define it in a module that they can import",
     ),
 }
-
-
-def _main_modules() -> Iterator[Fault]:
-    for what, (text, hint) in MAINS.items():
-        yield Fault(AREA, f"a script {what}", partial(_run_main, text, hint))
 
 
 def _run_main(text: str, hint: str, folder: Path) -> None:

@@ -27,14 +27,6 @@ from tests.faults.worker_processes import (
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    yield from _too_little()
-    yield from _servers()
-
-
-# -- too little -----------------------------------------------------------------------------------
-
-
-def _too_little() -> Iterator[Fault]:
     for more in (0, 2, 4, 9, 18):
         what = f"{more} more file descriptors for 8 workers"
         yield Fault(AREA, what, lambda _, more=more: _few_descriptors(more))
@@ -42,6 +34,8 @@ def _too_little() -> Iterator[Fault]:
     for megabytes in (0, 4):
         what = f"workers that may take {megabytes} MB more"
         yield Fault(AREA, what, lambda _, more=megabytes: _little_memory(more))
+    yield Fault(AREA, "the server is killed before a start", lambda _: _no_server(), GOES_ON)
+    yield Fault(AREA, "the server is killed with a vector open", lambda _: _server_lost())
 
 
 def _few_descriptors(more: int) -> None:
@@ -100,14 +94,6 @@ def _little_memory(megabytes: int) -> None:
         for _ in range(5):
             env.reset(options={"reconfigure": True})
             env.step(actions(env))
-
-
-# -- the server -----------------------------------------------------------------------------------
-
-
-def _servers() -> Iterator[Fault]:
-    yield Fault(AREA, "the server is killed before a start", lambda _: _no_server(), GOES_ON)
-    yield Fault(AREA, "the server is killed with a vector open", lambda _: _server_lost())
 
 
 def _no_server() -> None:

@@ -33,20 +33,12 @@ from tests.faults.worker_processes import (
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    yield from _threads()
     yield from _copies()
-
-
-# -- threads --------------------------------------------------------------------------------------
-
-
-def _threads() -> Iterator[Fault]:
     for name, use in {**USES, "close()": lambda env: env.close()}.items():
         for workers in (0, 2):
             what = f"{name} while another thread steps a vector of {workers} workers"
             yield Fault(AREA, what, lambda _, use=use, workers=workers: _collide(use, workers))
     yield Fault(AREA, "four threads step one vector", lambda _: _four_threads(), GOES_ON)
-    yield Fault(AREA, "four threads make vectors", lambda _: _all_make(), GOES_ON)
     yield Fault(AREA, "Ctrl-C again and again", lambda _: _interrupted(), GOES_ON)
 
 
@@ -85,13 +77,6 @@ def _four_threads() -> str:
         assert len(living_workers(env)) == 2
         assert info["elapsed_steps"].tolist() == [0, 0]
     return f"{sum(steps)} steps taken, {sum(refused)} refused"
-
-
-def _all_make() -> None:
-    results: list[bytes] = []
-    _run_threads(lambda _: results.append(play_own()))
-    assert len(set(results)) == 1
-    assert len(results) == 4
 
 
 def _run_threads(target: Callable[[int], Any]) -> None:
