@@ -49,7 +49,7 @@ def faults() -> Iterator[Fault]:
 
 
 # What is as flat as a picture, and is left out.
-_FLAT = {"stl: one face", "glb: flat", "glb: a node of size 0"}
+_FLAT = {"glb: flat", "glb: a node of size 0"}
 # What trimesh makes sense of, and SAPIEN refuses.
 _READ_BY_TRIMESH = {"glb: a node below itself"}
 
@@ -110,7 +110,6 @@ def _other(kind: str) -> str:
 
 _DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda data: b"",
-    "its first half": lambda data: data[: len(data) // 2],
     "zeros": lambda data: bytes(len(data)),
     "random bytes": lambda data: bytes(i * i * 31 % 251 for i in range(5000)),
     "a list of users": lambda data: b"root:x:0:0:root:/root:/bin/bash\n" * 30,
@@ -127,13 +126,6 @@ _VERTICES: dict[str, Callable[[str], bytes]] = {
     "stl": _stl_corner,
     "obj": lambda value: re.sub(rb"(?m)^v \S+", f"v {value}".encode(), good("obj"), count=1),
 }
-
-
-def _obj(*lines: str) -> Data:
-    return lambda: "\n".join(lines).encode()
-
-
-_POINTS = ("v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1")
 
 
 def _large() -> bytes:
@@ -155,22 +147,11 @@ _BROKEN: dict[str, tuple[str, Data]] = {
         "stl",
         lambda: good("stl")[:80] + b"\xff" * 4 + good("stl")[84:],
     ),
-    "stl: no faces": ("stl", lambda: good("stl")[:80] + bytes(4)),
-    "stl: text that breaks off": (
-        "stl",
-        lambda: b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0",
-    ),
     "glb: flat": ("glb", _flat),
-    "obj: an index out of range": ("obj", _obj(*_POINTS, "f 1 2 999999999")),
-    "obj: no faces": ("obj", _obj(*_POINTS)),
-    "obj: corners that are words": ("obj", _obj("v a b c", "f 1 1 1")),
+    "obj: corners that are words": ("obj", lambda: b"v a b c\nf 1 1 1"),
     "ply: it announces 2 billion corners": (
         "ply",
         lambda: good("ply").replace(b"element vertex 8", b"element vertex 2147483647"),
-    ),
-    "dae: billion laughs": (
-        "dae",
-        lambda: b'<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]>' + _collada(),
     ),
     "dae: an entity in UTF-16": (
         "dae",
@@ -178,10 +159,6 @@ _BROKEN: dict[str, tuple[str, Data]] = {
             '<?xml version="1.0" encoding="utf-16"?><!DOCTYPE x [<!ENTITY a "ha">]>'
             + _collada().decode()
         ).encode("utf-16"),
-    ),
-    "glb: its chunk is 2 GB long": (
-        "glb",
-        lambda: good("glb")[:12] + b"\0\0\0\x80" + good("glb")[16:],
     ),
     "gltf: its buffer is missing": (
         "gltf",
