@@ -13,20 +13,11 @@ import pytest
 import torch
 
 import robot_layouts.data.playing.scheduler
-from robot_layouts.data.playing.executor import (
-    ProcessExecutor,
-    WorkerError,
-    choose_executor,
-)
+from robot_layouts.data.playing.executor import ProcessExecutor, WorkerError, choose_executor
 from robot_layouts.data.playing.in_process import InProcessExecutor
 from robot_layouts.data.playing.scheduler import Event
 from robots import TaskError
-from tests.data.plays import (
-    EveryOtherDies,
-    Play,
-    SaysAndRests,
-    makes_what_cannot_be_pickled,
-)
+from tests.data.plays import EveryOtherDies, Play, SaysAndRests, makes_what_cannot_be_pickled
 
 ROOT = Path(__file__).parents[2]
 

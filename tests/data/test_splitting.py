@@ -10,12 +10,7 @@ import h5py
 import pytest
 
 import tasks
-from robot_layouts.data.reading.json_files import (
-    manifest_path,
-    matches,
-    read_manifest,
-    seeds_of,
-)
+from robot_layouts.data.reading.json_files import manifest_path, matches, read_manifest, seeds_of
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording import recorder as recorders
 from robot_layouts.data.recording.recorder import Recorder

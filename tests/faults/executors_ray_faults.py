@@ -13,12 +13,7 @@ from unittest.mock import patch
 
 from robot_layouts.data.playing.ray_executor import RayExecutor
 from tests.faults.fault import Fault
-from tests.faults.players import (
-    AREA,
-    Mischief,
-    fault_of,
-    ray_executor,
-)
+from tests.faults.players import AREA, Mischief, fault_of, ray_executor
 
 NO_ADDRESS = (
     *("", "local", "head", "head:", ":6379", "head:0", "head:99999", "head:6379x"),

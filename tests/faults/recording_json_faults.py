@@ -11,14 +11,7 @@ from typing import Any
 from robot_layouts.data.playing.replay import open_recording
 from robot_layouts.data.reading.recorded_task import task_for
 from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
-from tests.faults.recording_files import (
-    AREA,
-    contents,
-    edit_json,
-    expect_whole,
-    read,
-    recording,
-)
+from tests.faults.recording_files import AREA, contents, edit_json, expect_whole, read, recording
 
 NOT_NUMBERS = ("seven", 3.5, -1, True, {}, float("nan"), 10**30)
 NOT_OBJECTS = ("text", 3, [], ["a", "b"], True)

@@ -14,13 +14,7 @@ from typing import Any
 import tasks
 from robot_layouts.data.recording.recorder import Recorder
 from tests.faults.fault import GOES_ON, Fault, each
-from tests.faults.recording_files import (
-    AREA,
-    SECRET,
-    episodes,
-    go_on,
-    recorder,
-)
+from tests.faults.recording_files import AREA, SECRET, episodes, go_on, recorder
 
 FIRST, SECOND = "seed-0000000010.part", "seed-0000000011.part"
 

@@ -8,13 +8,7 @@ from pathlib import Path
 from layouts.visuals import read_visuals
 from robots import LocalUrdf
 from tests.faults.fault import NO_FILES, Fault
-from tests.faults.toy_robots import (
-    BOX,
-    mesh,
-    read_by_all,
-    toy,
-    write_mesh,
-)
+from tests.faults.toy_robots import BOX, mesh, read_by_all, toy, write_mesh
 
 AREA = "robot files"
 

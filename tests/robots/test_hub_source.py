@@ -17,15 +17,7 @@ from robots.assets.packages import MANI_SKILL
 from robots.assets.sources import HubSource, InstalledPackage
 from robots.assets.store import FileState
 from tests.robots.conftest import PANDA
-from tests.robots.hub_server import (
-    COMMIT,
-    Fault,
-    HubServer,
-    die,
-    login_page,
-    stall,
-    status,
-)
+from tests.robots.hub_server import COMMIT, Fault, HubServer, die, login_page, stall, status
 
 pytestmark = pytest.mark.usefixtures("store", "hub_client")
 
