@@ -39,15 +39,6 @@ API = "/api/datasets/"
 NOBODY = "http://127.0.0.1:9/x"
 
 
-def _reset(handler: hub_server.Handler, body: bytes) -> None:
-    handler.reset()
-
-
-def _nonsense(handler: hub_server.Handler, body: bytes) -> None:
-    handler.wfile.write(b"\x16\x03\x01 this is no HTTP\r\n\r\n")
-    handler.close_connection = True
-
-
 def _silence(handler: hub_server.Handler, body: bytes) -> None:
     handler.rfile.read(1)  # returns when the client goes away
 
@@ -55,8 +46,8 @@ def _silence(handler: hub_server.Handler, body: bytes) -> None:
 # What a server does to requests of a file (HEAD and GET), or to GET alone.
 TO_FILES: dict[str, hub_server.Fault] = {
     "a login page": hub_server.login_page,
-    "no HTTP": _nonsense,
-    "a reset": _reset,
+    "no HTTP": hub_server.nonsense,
+    "a reset": hub_server.reset,
     "a redirect to itself": redirect(f"/datasets/{hub_server.DATASET}/resolve/{COMMIT}/x"),
     "a redirect to nobody": redirect(NOBODY),
     "a redirect to a file here": redirect("file:///etc/passwd"),
@@ -72,7 +63,7 @@ TO_BODIES: dict[str, hub_server.Fault] = {
 TO_API: dict[str, hub_server.Fault] = {
     "a login page": hub_server.login_page,
     "nothing": _silence,
-    "no HTTP": _nonsense,
+    "no HTTP": hub_server.nonsense,
     "null": page(200, "null"),
     "a commit that is a number": page(200, '{"id": "x", "sha": 5}'),
     "a hundred thousand levels": page(200, "[" * 100_000),

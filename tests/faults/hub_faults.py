@@ -26,19 +26,10 @@ GIT = ".gitattributes"  # which is there before anything is pushed
 SECONDS = 2  # for an answer
 
 
-def _reset(handler: hub_server.Handler, body: bytes) -> None:
-    handler.reset()
-
-
-def _nonsense(handler: hub_server.Handler, body: bytes) -> None:
-    handler.wfile.write(b"\x16\x03\x01 this is no HTTP\r\n\r\n")
-    handler.close_connection = True
-
-
 ANSWERS: dict[str, hub_server.Fault] = {
     "a login page": hub_server.login_page,
-    "no HTTP": _nonsense,
-    "a reset": _reset,
+    "no HTTP": hub_server.nonsense,
+    "a reset": hub_server.reset,
     "a list": page(200, "[1]"),
     "a hundred thousand levels": page(200, "[" * 100_000),
     "a page that quotes the token": page(400, f"<p>bad token {TOKEN}</p>"),
