@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.data.writable_hub import WritableHub, running_hub
+
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
@@ -17,3 +19,10 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
         pytest.skip("file systems cannot be mounted here")
     yield place
     subprocess.run(["umount", str(place)], check=True)
+
+
+@pytest.fixture
+def hub(tmp_path: Path) -> Iterator[WritableHub]:
+    """A Hub on this machine that this process finds."""
+    with running_hub(tmp_path) as server:
+        yield server

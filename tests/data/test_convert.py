@@ -16,7 +16,6 @@ from robot_layouts.__main__ import main
 from robot_layouts.data.playing.mode_conversion import why_lost
 from robot_layouts.data.playing.replay import open_recording, replay
 from robot_layouts.data.reading.recorded_task import task_for
-from robot_layouts.data.recording.convert import Conversion
 from robot_layouts.data.recording.record import record
 from tests.data.recordings import edited
 
@@ -157,16 +156,6 @@ def test_why_one_is_not_kept(recording, mode, share, reason):
         with closing(tasks.make(TASK, obs_mode="none", control_mode=mode)) as task:
             why = why_lost(source, episode.seed, share * episode.actions, task)
     assert re.search(reason, why)
-
-
-def test_each_that_is_not_kept_has_its_line(tmp_path):
-    found = Conversion(tmp_path, [0], [1, 2], [], {1: "so far", 2: "too far"})
-    assert str(found).splitlines() == [
-        f"1 of 3 successful episodes succeed in the other mode, too; not kept: the seeds 1, 2:"
-        f" {tmp_path}",
-        "seed 1: so far",
-        "seed 2: too far",
-    ]
 
 
 @pytest.mark.long

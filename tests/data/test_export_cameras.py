@@ -16,11 +16,10 @@ import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data.export.columns import ColumnReader, state_row
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.export.drawing import Drawing, DrawnEpisode, draw_in_order
+from robot_layouts.data.export.drawing import Drawing, DrawnEpisode
 from robot_layouts.data.export.lerobot import FileLimits, LeRobotWriter
 from robot_layouts.data.export.shots import PictureChannel, choose_shots
 from robot_layouts.data.playing.executor import ProcessExecutor
-from robot_layouts.data.playing.scheduler import Event
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
@@ -213,40 +212,6 @@ def flat(camera: str, value: int, moments: int = 2) -> tuple[PictureChannel, np.
     return PictureChannel(camera, "rgb", 16, 16), np.full((moments, 16, 16, 3), value, np.uint8)
 
 
-class OutOfTurn:
-    """Plays in any order but the one asked for."""
-
-    def run(self, prepare, seeds):
-        yield Event(None, note="hello")
-        yield Event(None, died="worker x was killed", worker="x")
-        for seed in reversed(seeds):
-            yield Event(seed, note=0.5)
-            yield Event(seed, result=DrawnEpisode(dict([flat("a", seed)]), seed % 2 == 0))
-
-
-class Job:
-    """What a crew needs to know of a job whose workers do something else."""
-
-    class shots:  # noqa: N801
-        channels = [PictureChannel("a", "rgb", 16, 16)]
-
-
-def test_episodes_are_handed_out_in_their_order(tmp_path):
-    parts, told = [], []
-    values = []
-    for episode in draw_in_order(
-        Job, OutOfTurn(), [0, 2, 3, 5], tmp_path, parts.append, told.append
-    ):
-        (frame, again) = episode
-        (picture,) = frame.values()
-        values.append((int(picture[0, 0, 0]), episode.exact))
-        np.testing.assert_array_equal(picture, *again.values())
-    assert values == [(0, True), (2, True), (3, False), (5, False)]
-    assert list(tmp_path.iterdir()) == []
-    assert parts == [0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4]
-    assert told == ["hello", "worker x was killed; another takes its place"]
-
-
 def test_full_video_files_are_followed_by_others(tmp_path):
     path = record(tmp_path / "push.h5", "PushT-v1", [2, 2, 2])
     with Recording(path) as file:
@@ -325,13 +290,9 @@ def test_a_task_may_say_its_own_instruction():
     ("options", "complaint"),
     [
         ({"depth": True}, "depth is of no use without cameras"),
-        ({"size": (8, 8)}, "size is of no use without cameras"),
-        ({"images": True, "video": True}, "images is of no use without cameras"),
         ({"images": True, "video": True, "cameras": "all"}, "either a video or images"),
         ({"cameras": []}, "no camera is named"),
-        ({"cameras": [5]}, "their names are needed"),
         ({"cameras": "all", "size": (8, 0)}, "size is 0; it must be an integer from 1"),
-        ({"cameras": "all", "size": 8}, "size is 8; width and height"),
         ({"cameras": "all", "format": "robomimic", "images": True}, "has no images here"),
     ],
 )
@@ -378,19 +339,6 @@ def test_videos_have_even_sides(tmp_path):
     PictureWriter(tmp_path, channels, 20, FileLimits(), images=True)
 
 
-class Watched:
-    """Two processes, whose ids are kept."""
-
-    def __init__(self) -> None:
-        self.workers = set[int]()
-
-    def run(self, prepare, seeds):
-        for event in ProcessExecutor(2).run(prepare, seeds):
-            if event.worker.startswith("process "):
-                self.workers.add(int(event.worker.split()[1]))
-            yield event
-
-
 @dataclass
 class Struck:
     """Two processes, one of which dies while it draws."""
@@ -420,22 +368,6 @@ def test_it_does_not_matter_who_draws(recording, tmp_path, options):
         files.append(found)
     assert files[0] == files[1] == files[2]
     assert sum("another takes its place" in text for text in told) == 1
-
-
-@drawn
-@pytest.mark.long
-def test_whatever_ends_drawing_in_workers_leaves_nothing(recording, tmp_path):
-    def interrupt(done, total):
-        raise KeyboardInterrupt
-
-    executor = Watched()
-    wanted = Export(
-        recording, "robomimic", tmp_path / "out", cameras="all", size=SIZE, include_failures=True
-    )
-    with pytest.raises(KeyboardInterrupt):
-        export(wanted, interrupt, executor=executor)
-    assert list(tmp_path.iterdir()) == []
-    assert not any(Path(f"/proc/{worker}").exists() for worker in executor.workers)
 
 
 @drawn

@@ -13,19 +13,15 @@ import numpy as np
 import pytest
 
 import robot_layouts.core.progress as progress
-import robot_layouts.data.export.drawing as pictures
 import tasks
 from layouts import Layout, Placement
 from robot_layouts.__main__ import main
 from robot_layouts.data.export import dataset
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.export.shots import choose_shots
-from robot_layouts.data.reading.json_files import TrajectoryError
-from robot_layouts.data.reading.recording import Recording, Trajectory
+from robot_layouts.data.reading.recording import Trajectory
 from robot_layouts.data.recording.recorder import Recorder
-from robot_layouts.simulation.rendering import SIZE
-from robots import RecordingError, RobotRegistry, TaskError
+from robots import RobotRegistry, TaskError
 from robots.descriptor import ActionSplit
 from tasks.episode import play
 from tests.data.recordings import edited, record, succeed
@@ -143,20 +139,6 @@ def test_a_used_folder_is_left_alone(recording, tmp_path, capsys, form):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine"]
 
 
-def test_a_file_is_no_folder(recording, tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    assert run(recording, "--format", "lerobot", "--out", tmp_path / "file") == 1
-    assert "file is a file; a folder's name is needed" in capsys.readouterr().err
-    assert run(recording, "--format", "lerobot", "--out", tmp_path / "file" / "out") == 1
-    assert "a folder's name is needed" in capsys.readouterr().err
-
-
-def test_a_missing_recording_is_named(tmp_path, capsys):
-    record(tmp_path / "recording.h5", TASK, [1])
-    assert run(tmp_path / "recordin.h5", "--format", "lerobot", "--out", tmp_path / "out") == 1
-    assert "recording.h5" in capsys.readouterr().err
-
-
 def test_an_empty_recording_is_refused(tmp_path, capsys):
     recording = record(tmp_path / "empty.h5", TASK, [])
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 1
@@ -206,16 +188,6 @@ def test_whatever_ends_an_export_it_leaves_nothing(recording, tmp_path):
         assert nothing_was_left(tmp_path)
 
 
-def test_a_full_disk_is_a_clear_error(recording, tmp_path, monkeypatch):
-    def full(*args: object, **kwargs: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "write_text", full)
-    with pytest.raises(RecordingError, match="cannot write .*out: .*No space left on device"):
-        export(Export(recording, "lerobot", tmp_path / "out", include_failures=True))
-    assert nothing_was_left(tmp_path)
-
-
 def test_without_pyarrow_the_extra_is_named(recording, tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out") == 1
@@ -237,45 +209,6 @@ def test_without_a_vulkan_driver_a_video_is_refused(recording, tmp_path, capsys,
     assert run(recording, "--format", "lerobot", "--out", tmp_path / "out", "--video") == 1
     assert "no usable Vulkan driver (none); export without video" in capsys.readouterr().err
     assert nothing_was_left(tmp_path)
-
-
-class Blind:
-    """Stands where a camera would; what it would see is in the state."""
-
-    def __init__(self, simulation, eye, target):
-        pass
-
-    def take(self):
-        return np.zeros((1, SIZE, SIZE, 3), np.uint8)
-
-
-def test_pictures_follow_the_recorded_states(recording, monkeypatch):
-    monkeypatch.setattr(pictures, "Cameras", Blind)
-    with edited(recording) as file:
-        file["traj_2/env_states/actors/Tee"][1:, 0] += 0.05  # no replay ends there
-    with Recording(recording) as file:
-        task = tasks.make(TASK)
-        columns = ColumnReader(task).read(file[2])
-        shots = choose_shots(task, ["overview"])
-        drawing = pictures.Drawing(task, columns, shots)
-        shown = [task.get_state_dict()["actors"]["Tee"].numpy()[0] for _ in drawing]
-        assert not drawing.exact
-        recorded = columns.states["actors"]["Tee"][:-1]
-        np.testing.assert_array_equal(shown[0], recorded[0])
-        np.testing.assert_allclose(np.array(shown)[:, :7], recorded[:, :7], atol=1e-6)
-        with pytest.raises(TrajectoryError, match="episode 2 names no seed"):
-            pictures.Drawing(task, dataclasses.replace(columns, seed=None), shots)
-
-
-def test_pictures_of_an_exact_replay_need_no_help(recording, monkeypatch):
-    monkeypatch.setattr(pictures, "Cameras", Blind)
-    with Recording(recording) as file:
-        task = tasks.make(TASK)
-        monkeypatch.setattr(task, "set_state_dict", lambda state: pytest.fail("put into a state"))
-        columns = ColumnReader(task).read(file[2])
-        drawing = pictures.Drawing(task, columns, choose_shots(task, ["overview"]))
-        assert len(list(drawing)) == 4
-        assert drawing.exact
 
 
 UNFINISHED = """

@@ -14,7 +14,6 @@ import tasks
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.export.lerobot import FileLimits, LeRobotWriter
-from robot_layouts.data.export.lerobot_files import PictureStatistics
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.video import video_problem
@@ -199,19 +198,6 @@ def test_statistics_of_joints_add_up_column_by_column(recording, dataset):
             rows = wanted[name][wanted["episode_index"] == episode].astype(float)
             columns = [np.std(np.ascontiguousarray(column)) for column in rows.T]
             assert episodes[f"stats/{name}/std"][episode] == columns
-
-
-def test_picture_statistics_are_those_of_the_pixels():
-    pictures = np.random.default_rng(0).integers(0, 200, (3, 8, 6, 3), dtype=np.uint8)
-    counted, other = PictureStatistics(), PictureStatistics()
-    counted.add(pictures[0])
-    for picture in pictures[1:]:
-        other.add(picture)
-    counted.include(other)
-    wanted = statistics(pictures.reshape(-1, 3) / 255) | {"count": np.array([3])}
-    for name, values in counted.describe().items():
-        assert values.shape == ((1,) if name == "count" else (3, 1, 1))
-        np.testing.assert_allclose(values.ravel(), wanted[name], rtol=1e-12)
 
 
 def test_full_files_are_followed_by_others(recording, tmp_path):

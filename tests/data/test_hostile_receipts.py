@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from robot_layouts import __main__ as console
-from robot_layouts.__main__ import main
 from robot_layouts.data.receipts import ReceiptError
 from tests.data.receipt_files import NAMED, again, edit, written
 
@@ -46,43 +45,21 @@ def _set(*path):
         (_set("episodes", []), "a receipt has one episode or more; this has none"),
         (_set("episodes", 0, "seed", -1), r"episodes\[0\].seed is -1; it must be a whole number"),
         (_set("episodes", 1, "seed", 0), "this has seed 0 twice"),
-        (_set("episodes", 0, "trace", "AA"), "its trace must be 22 bytes in base64"),
         (_set("episodes", 0, "steps", 9), "its trace must be 20 bytes in base64"),
         (_set("episodes", 0, "states", "x" * 64), r"states is .* it must be a SHA-256: 64 of the"),
         (_set("episodes", 0, "total", float("nan")), r"total is nan; it must be a finite number"),
         (_set("task", "id", "os:abort"), "id is 'os:abort'; it must be a task's id, without a mod"),
         (_set("task", "id", "PushX-v1"), "type: --task tasks.maniskill.push_t:PushX-v1$"),
         (_set("policy", {}), "it has no policy.kind; that must be a text"),
-        (_set("policy", "name", ""), "policy.name is ''; it must be a text of 1 to 200"),
         (_set("making", "physics", {"timestp": 1}), "the receipt's task cannot be made here: "),
-        (_set("making", "physics", [1]), "making.physics is .*; it must be an object or None"),
-        (_set("making", "num_envs", 10**6), "the receipt's task cannot be made here: num_envs is"),
-        (_set("making", "obs_mode", "smell"), "the receipt's task cannot be made here: "),
-        (
-            _set("making", "layout", "arm", "robot", "pandy"),
-            "a robot at 'arm' that is not",
-        ),
-        (_set("making", "layout", {}), "the receipt's task cannot be made here: "),
+        (_set("making", "layout", "arm", "robot", "pandy"), "a robot at 'arm' that is not"),
         (_set("making", "layout", "arm", "position", [1, 2]), "a list of 3 values"),
-        (_set("making", "cameras", [{"eye": 1}]), "the receipt's task cannot be made here: "),
-        (_set("making", "randomization", {"mas": {}}), "the receipt's task cannot be made here: "),
-        (_set("making", "control_mode", {"arm": "x"}), "the receipt's task cannot be made here: "),
         (_set("environment", []), "environment is .*; it must be an object"),
     ],
 )
 def test_a_receipt_of_somebody_else(copy, change, complaint):
     with pytest.raises(ReceiptError, match=complaint):
         again(edit(copy, change), policy=NAMED)
-
-
-def test_no_receipt_at_all(tmp_path, capsys):
-    assert main(["verify", str(tmp_path)]) == 1
-    assert "it is a directory, not a regular file" in capsys.readouterr().err
-    (tmp_path / "x").write_bytes(b"\xff\xfe\x00")
-    assert main(["verify", str(tmp_path / "x")]) == 1
-    assert "it is not UTF-8" in capsys.readouterr().err
-    with pytest.raises(SystemExit, match="2"):
-        main(["verify"])
 
 
 STRANGE = """
@@ -122,15 +99,7 @@ def _hash_of(module: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        "http.server:test",
-        "venv:main",
-        "subprocess:call",
-        "antigravity:fly",
-        "strange:policy",
-        "strange:policy; touch ran",
-    ],
+    "name", ["subprocess:call", "antigravity:fly", "strange:policy; touch ran"]
 )
 def test_no_policy_is_imported_because_a_receipt_names_it(copy, called, name, capsys):
     """Whoever writes a receipt knows the hash of any file, and may bring one along."""
@@ -147,8 +116,3 @@ def test_no_policy_is_imported_because_a_receipt_names_it(copy, called, name, ca
         f"error: the receipt is of the policy {name}, and a receipt does not choose which code"
         f" runs; to play what is here, type: --policy {shlex.quote(name)}\n"
     )
-
-
-def test_a_robot_for_a_place_that_there_is_not(receipt):
-    with pytest.raises(ReceiptError, match="unknown place 'arms'. Did you mean 'arm'"):
-        again(receipt, policy=NAMED, robots={"arms": "panda_stick"})

@@ -3,7 +3,6 @@
 `make faults` tries several hundred more; see `tests.faults.recording_h5_faults` and its neighbours.
 """
 
-import json
 import os
 import struct
 import threading
@@ -73,84 +72,6 @@ def test_an_export_holds_no_bytes_of_other_files(path, tmp_path, refer, why):
         with pytest.raises(TrajectoryError, match=why):
             export(Export(path, name, tmp_path / "out", include_failures=True))
     assert {p.name for p in tmp_path.iterdir()} == {"trajectory.h5", "trajectory.json", "secret"}
-
-
-@pytest.mark.parametrize("rows", [2**31, 10**12])
-def test_an_array_that_is_larger_than_any_memory_is_refused(path, rows):
-    with edited(path) as file:
-        del file["traj_0/actions"]
-        chunks = (2**20, 7)
-        file.create_dataset("traj_0/actions", (rows, 7), "f4", chunks=chunks, compression="gzip")
-    with Recording(path) as file, pytest.raises(TrajectoryError, match="at most 1,073,741,8"):
-        file[0]
-
-
-def test_actions_must_be_of_the_steps_that_the_json_says(path):
-    beside = path.with_suffix(".json")
-    summary = json.loads(beside.read_text())
-    summary["episodes"][0]["elapsed_steps"] = 2
-    beside.write_text(json.dumps(summary))
-    with Recording(path) as file:
-        with pytest.raises(TrajectoryError, match=r"shape \(3, 7\); the json .* says 2 steps"):
-            file.expect("PushT-v1", 7)
-        with pytest.raises(TrajectoryError, match=r"shape \(3, 7\); the json .* says 2 steps"):
-            file[0]
-
-
-@pytest.mark.parametrize(
-    ("where", "value", "why"),
-    [
-        ("env_kwargs", ["a"], r"env_info.env_kwargs is \['a'\]; it must be an object or None"),
-        ("env_kwargs", "text", "env_info.env_kwargs is 'text'; it must be"),
-        ("reset_kwargs", ["a"], r"episodes\[0\].reset_kwargs is \['a'\]; it must be an object"),
-        ("reset_kwargs", {"options": "x"}, r"episodes\[0\].reset_kwargs.options is 'x'; it must"),
-        ("reset_kwargs", {"seed": -1}, r"reset_kwargs.seed is -1; it must be a whole number from"),
-        ("elapsed_steps", "3", r"episodes\[0\].elapsed_steps is '3'; it must be a whole number"),
-    ],
-)
-def test_every_value_of_the_json_is_looked_at(path, where, value, why):
-    beside = path.with_suffix(".json")
-    summary = json.loads(beside.read_text())
-    holder = summary["env_info"] if where == "env_kwargs" else summary["episodes"][0]
-    holder[where] = value
-    beside.write_text(json.dumps(summary))
-    with pytest.raises(TrajectoryError, match=why):
-        Recording(path)
-
-
-@pytest.mark.parametrize(
-    ("layout", "why"),
-    [
-        ([1], r"layout is \[1\]; it must be an object"),
-        ({"arm": {"robot": "panda"}}, r"it has no layout\['arm'\].position"),
-        ("[" * 100_000, "attribute layout: its json nests deeper"),
-    ],
-)
-def test_every_value_of_the_attributes_is_looked_at(path, layout, why):
-    with edited(path) as file:
-        file.attrs["layout"] = layout if isinstance(layout, str) else json.dumps(layout)
-    with pytest.raises(TrajectoryError, match=why):
-        Recording(path)
-
-
-def test_a_bit_that_flipped_is_not_played(path):
-    with h5py.File(path) as file:
-        place = file["traj_1/rewards"].id.get_offset()
-    content = bytearray(path.read_bytes())
-    content[place] ^= 1
-    path.write_bytes(content)
-    with Recording(path) as file:
-        assert len(file[0].actions) == 3
-        with pytest.raises(TrajectoryError, match="traj_1 .* its checksum is another"):
-            file[1]
-
-
-def test_a_file_of_an_earlier_version_has_no_checksums_and_is_read(path, whole):
-    with edited(path):
-        pass
-    with Recording(path) as earlier, Recording(whole) as file:
-        for one, other in zip(earlier, file, strict=True):
-            np.testing.assert_array_equal(one.actions, other.actions)
 
 
 def test_a_file_of_others_is_read_as_h5py_reads_it(tmp_path):

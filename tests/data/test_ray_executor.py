@@ -28,7 +28,6 @@ from tests.data.clusters import Nodes, running_cluster
 from tests.data.plays import (
     TASK,
     CodeFolder,
-    Here,
     Play,
     at_random,
     cannot_prepare,
@@ -173,12 +172,6 @@ def test_a_recording_on_a_cluster_is_stopped_and_goes_on(nodes, tmp_path):
     assert f"{count} of {whole} episodes were recorded before" in said
     assert "20 new episodes, 0 with success" in printed
     assert same_files(out / FILE, recorded_directly(tmp_path / FILE, range(whole)))
-
-
-@pytest.mark.long
-def test_a_policy_does_as_well_there_as_here(nodes):
-    there = evaluate(Wanders(), TASK, range(6), executor=RayExecutor(nodes.address))
-    assert there.scores == evaluate(Wanders(), TASK, range(6), executor=Here()).scores
 
 
 @pytest.mark.long

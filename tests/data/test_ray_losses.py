@@ -19,7 +19,6 @@ import robot_layouts.data.playing.scheduler
 from robot_layouts.core.processes.start import WorkerError
 from robot_layouts.data.playing.ray_executor import RayExecutor
 from robot_layouts.data.reading.recording import FILE
-from robots import TaskError
 from tests.data.clusters import running_cluster
 from tests.data.plays import Play
 from tests.data.test_executor import squares
@@ -37,15 +36,6 @@ def nodes():
     with running_cluster() as nodes:
         nodes.grow(2)
         yield nodes
-
-
-@pytest.mark.parametrize(
-    "address",
-    ["", "local", "head", "head:", ":6379", "head:0", "head:99999", "ray://h:1", 6379, None],
-)
-def test_what_is_no_address(address):
-    with pytest.raises(TaskError, match='is no address of a Ray cluster; it must be "HOST:PORT"'):
-        RayExecutor(address)
 
 
 @pytest.mark.long

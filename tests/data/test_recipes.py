@@ -167,14 +167,3 @@ def test_an_empty_recipe_is_refused(tmp_path):
         load_recipe(written(tmp_path / "recipe.yaml", ""))
     with pytest.raises(TaskError, match="Did you mean 'recordings'?"):
         load_recipe(written(tmp_path / "recipe.yaml", "recording: {}"))
-
-
-@pytest.mark.parametrize("robots", ['{right: "chosen_one:ROBOT"}', '"chosen_other:ROBOT"'])
-def test_a_recipe_chooses_no_code_by_its_robots(tmp_path, monkeypatch, robots):
-    monkeypatch.syspath_prepend(tmp_path)
-    for name in ("chosen_one", "chosen_other"):
-        written(tmp_path / f"{name}.py", f"open({str(tmp_path / 'ran')!r}, 'w')")
-    entry = f"recordings: {{a: {{task: TwoRobotPickCube-v1, seeds: [0], robots: {robots}}}}}"
-    with pytest.raises(TaskError, match="code of the module 'chosen_"):
-        load_recipe(written(tmp_path / "recipe.yaml", entry))
-    assert not (tmp_path / "ran").exists()

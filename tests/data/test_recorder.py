@@ -2,11 +2,7 @@
 
 import json
 import os
-import shutil
-import signal
 import subprocess
-import sys
-import time
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +13,7 @@ import pytest
 
 import tasks
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording.episode_files import part_path, read_part
+from robot_layouts.data.recording.episode_files import read_part
 from robot_layouts.data.recording.recorder import Recorder
 from robots import ActionError, RecordingError, TaskError
 from tasks.episode import PlayedEpisode, play
@@ -100,15 +96,6 @@ def test_the_json_file_tells_how_to_play_it(recorded):
     ]
 
 
-def test_one_robot_has_a_plain_control_mode(tmp_path):
-    env = tasks.make("PushT-v1")
-    with Recorder(tmp_path / "one.h5", env) as recorder:
-        recorder.add(short_episode(env, 0))
-    episode = json.loads(recorder.json_path.read_text())["episodes"][0]
-    assert episode["control_mode"] == "pd_joint_delta_pos"
-    assert episode["success"] is False
-
-
 def test_a_replay_from_the_file_is_the_same_to_the_last_bit(recorded):
     recorder, _ = recorded
     summary = json.loads(recorder.json_path.read_text())
@@ -121,42 +108,6 @@ def test_a_replay_from_the_file_is_the_same_to_the_last_bit(recorded):
                 for name, rows in entries.items():
                     np.testing.assert_array_equal(group[f"env_states/{kind}/{name}"], rows)
             np.testing.assert_array_equal(group["rewards"], again.rewards)
-
-
-KILLED = """
-import sys, numpy as np, tasks
-from tasks.episode import play
-from robot_layouts.data.recording.recorder import Recorder
-from robot_layouts.data.reading.recording import Recording
-env = tasks.make("PushT-v1")
-with Recorder(sys.argv[1], env) as recorder:
-    for seed in range(10**6):
-        recorder.add(play(env, seed, np.full((3, 7), seed / 100, np.float32)))
-        print(seed, flush=True)
-"""
-
-
-@pytest.mark.long
-def test_a_killed_recording_keeps_its_finished_episodes(tmp_path):
-    path = tmp_path / "killed.h5"
-    with subprocess.Popen(
-        [sys.executable, "-c", KILLED, str(path)], stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        finished = [int(process.stdout.readline()) for _ in range(5)]
-        time.sleep(0.02)
-        os.kill(process.pid, signal.SIGKILL)
-        finished += [int(line) for line in process.stdout.read().split("\n")[:-1]]
-    assert not path.exists()
-    with Recorder(path, tasks.make("PushT-v1"), resume=True) as recorder:
-        assert set(finished) <= recorder.seeds <= {*finished, len(finished)}
-    with Recording(path) as file:
-        assert list(file.seeds) == list(range(len(file)))
-        assert len(file) == len(recorder)
-        for episode in file:
-            assert episode.actions.shape == (3, 7)
-            assert (episode.actions == np.float32(episode.seed / 100)).all()
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["killed.h5", "killed.json"]
 
 
 def same_files(one: Path, other: Path) -> bool:
@@ -249,35 +200,6 @@ def test_what_a_kill_leaves_half_done_is_tidied(tmp_path, push_t):
     assert names == ["tidy.h5", "tidy.json", "untidy.h5.partial"]
 
 
-def damaged(content: bytes) -> dict[str, bytes]:
-    middle = len(content) // 2
-    return {
-        "nothing": b"",
-        "zeros": bytes(len(content)),
-        "a short piece": content[:40],
-        "half": content[:middle],
-        "all but a byte": content[:-1],
-        "more": content + b"\0",
-        "another bit": content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :],
-    }
-
-
-@pytest.mark.parametrize("damage", damaged(b"of any length"))
-def test_a_part_that_is_torn_or_changed_is_recorded_again(tmp_path, push_t, damage):
-    env, episodes = push_t
-    path = tmp_path / "torn.h5"
-    recorder = Recorder(path, env)
-    for episode in episodes[:2]:
-        recorder.add(episode)
-    torn = part_path(recorder.parts, 1)
-    torn.write_bytes(damaged(torn.read_bytes())[damage])
-    del recorder
-    with Recorder(path, env, resume=True) as again:
-        assert again.seeds == {0}
-        again.add(episodes[1])
-    assert same_files(path, write(tmp_path / "whole.h5", env, episodes[:2]))
-
-
 def test_a_folder_of_parts_with_something_else_in_it_stays(tmp_path, push_t):
     env, episodes = push_t
     path = tmp_path / "recording.h5"
@@ -285,22 +207,6 @@ def test_a_folder_of_parts_with_something_else_in_it_stays(tmp_path, push_t):
         recorder.add(episodes[0])
         (recorder.parts / "notes").write_text("mine")
     assert [p.name for p in recorder.parts.iterdir()] == ["notes"]
-
-
-@pytest.mark.parametrize("array", ["actions", "rewards", "env_states/actors/Tee"])
-def test_an_episode_with_a_bit_that_flipped_is_recorded_again(tmp_path, push_t, array):
-    env, episodes = push_t
-    path, whole = (write(tmp_path / f"{name}.h5", env, episodes[:3]) for name in ("one", "two"))
-    with h5py.File(path) as file:
-        place = file[f"traj_1/{array}"].id.get_offset()
-    content = bytearray(path.read_bytes())
-    content[place] ^= 1
-    path.write_bytes(content)
-    with Recorder(path, env, resume=True) as again:
-        assert again.seeds == {0, 2}
-        assert again.damaged == [f"traj_1 of {path}"]
-        again.add(episodes[1])
-    assert same_files(path, whole)
 
 
 def test_a_recording_of_an_earlier_version_gets_its_checksums(tmp_path, push_t):
@@ -312,16 +218,6 @@ def test_a_recording_of_an_earlier_version_gets_its_checksums(tmp_path, push_t):
     with Recorder(path, env, resume=True) as again:
         assert again.damaged == []
         again.add(episodes[2])
-    assert same_files(path, whole)
-
-
-def test_episodes_in_another_order_are_put_in_theirs(tmp_path, push_t):
-    env, episodes = push_t
-    path, whole = (write(tmp_path / f"{name}.h5", env, episodes[:2]) for name in ("one", "two"))
-    with h5py.File(path, "r+") as file:
-        for old, new in (("traj_0", "x"), ("traj_1", "traj_0"), ("x", "traj_1")):
-            file.move(old, new)
-    Recorder(path, env, resume=True).close()
     assert same_files(path, whole)
 
 
@@ -374,14 +270,6 @@ class TestResuming:
         said = self.refusal(path, tasks.make("PushT-v1", control_mode="pd_joint_pos"))
         assert 'control_mode: recorded "pd_joint_delta_pos", here "pd_joint_pos"' in said
 
-    def test_a_foreign_file(self, tmp_path, push_t):
-        path = tmp_path / "foreign.h5"
-        with h5py.File(path, "w") as file:
-            file["traj_0/actions"] = np.zeros((2, 7))
-        assert "is no recording of this library" in self.refusal(path, push_t[0])
-        path.write_text("not even h5")
-        assert "is no recording of this library" in self.refusal(path, push_t[0])
-
     def test_a_refused_recording_leaves_nothing_behind(self, tmp_path, push_t):
         env, episodes = push_t
         path = write(tmp_path / "other.h5", env, episodes[:1])
@@ -389,57 +277,6 @@ class TestResuming:
         self.refusal(path, tasks.make("PullCube-v1"))
         assert path.read_bytes() == before
         assert sorted(p.name for p in tmp_path.iterdir()) == ["other.h5", "other.json"]
-
-    def test_the_json_is_mended(self, tmp_path, push_t):
-        env, episodes = push_t
-        path = write(tmp_path / "mended.h5", env, episodes[:2])
-        right = path.with_suffix(".json").read_text()
-        path.with_suffix(".json").write_text("{}")
-        Recorder(path, env, resume=True).close()
-        assert path.with_suffix(".json").read_text() == right
-
-
-FULL = """
-import sys, numpy as np, tasks
-from robots import RecordingError
-from tasks.episode import play
-from robot_layouts.data.recording.recorder import Recorder
-from robot_layouts.data.reading.recording import Recording
-env = tasks.make("PushT-v1")
-try:
-    with Recorder(sys.argv[1], env) as recorder:
-        for seed in range(10**4):
-            recorder.add(play(env, seed, np.zeros((22, 7), np.float32)))
-            print(seed, flush=True)
-except RecordingError as error:
-    sys.exit(f"error: {error}")
-"""
-
-
-def run_full(path: Path) -> tuple[list[int], str]:
-    done = subprocess.run([sys.executable, "-c", FULL, str(path)], capture_output=True, text=True)
-    assert done.returncode == 1, done.stderr
-    return [int(line) for line in done.stdout.split()], done.stderr.splitlines()[-1]
-
-
-def expect_resumable(path: Path, finished: list[int]) -> None:
-    copy = path.parent.parent / "copy"
-    shutil.copytree(path.parent, copy)
-    with Recorder(copy / path.name, tasks.make("PushT-v1"), resume=True) as recorder:
-        assert recorder.seeds == set(finished)
-    with Recording(copy / path.name) as file:
-        assert [episode.seed for episode in file] == finished
-
-
-@pytest.mark.long
-def test_a_full_disk(small_disk):
-    path = small_disk / "trajectory.h5"
-    finished, said = run_full(path)
-    assert len(finished) >= 3
-    assert finished == list(range(len(finished)))
-    assert said.startswith(f"error: cannot write {path.with_suffix('.parts')}/seed-")
-    assert said.endswith("No space left on device")
-    expect_resumable(path, finished)
 
 
 def test_a_disk_that_fills_up_while_episodes_are_joined(small_disk, push_t):

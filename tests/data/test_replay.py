@@ -15,7 +15,6 @@ from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
-from robots import UnknownNameError
 from tasks.episode import play
 from tests.data.plays import at_random
 from tests.data.recordings import edited
@@ -67,11 +66,6 @@ def test_the_same_again(capsys, recording):
         assert "2 of 2 episodes end as recorded; in 2 all states are equal to the last b" in printed
 
 
-def test_the_first_episodes_only(capsys, recording):
-    _, printed, _ = run(capsys, recording, "--episodes", 1)
-    assert "1 of 1 episodes end as recorded" in printed
-
-
 def test_the_body_with_the_largest_difference_is_named(capsys, path):
     def push(amount):
         def edit(rows):
@@ -83,16 +77,6 @@ def test_the_body_with_the_largest_difference_is_named(capsys, path):
     change(path, "traj_0/env_states/actors/goal_Tee", push(0.25))
     _, printed, _ = run(capsys, path)
     assert "from step 7 in Tee, max |Δ| 2.5e-01 in goal_Tee" in printed
-
-
-def test_a_path_with_brackets_is_printed_as_it_is(capsys, path):
-    folder = path.parent / "[red][" / "b]"
-    folder.mkdir(parents=True)
-    for suffix in (".h5", ".json"):
-        path.with_suffix(suffix).rename((folder / path.name).with_suffix(suffix))
-    code, printed, _ = run(capsys, folder)
-    assert code == 0
-    assert f"{folder}/{path.name}: PushT-v1" in printed
 
 
 def test_states_that_differ_are_found(capsys, path):
@@ -225,18 +209,3 @@ class TestOfficialFiles:
         self.put(recording, demos / "a", control_mode="pd_ee_dance")
         with pytest.raises(TrajectoryError, match=r"\n  .*was recorded in pd_ee_dance"):
             open_recording(None, TASK)
-
-    def test_neither_file_nor_task(self, capsys):
-        code, _, said = run(capsys)
-        assert code == 1
-        assert "neither a file nor a task is given" in said
-
-
-@pytest.mark.parametrize("name", ["push_t", "PushT-v1", "PUSH_T", "maniskill.push_t_native"])
-def test_names_of_a_task(name):
-    assert tasks.get_task_class(name).task_id == "PushT-v1"
-
-
-def test_a_name_that_is_none():
-    with pytest.raises(UnknownNameError, match="Did you mean 'maniskill.push_t_native'"):
-        tasks.get_task_class("push_t_nativ")

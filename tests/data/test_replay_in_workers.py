@@ -13,7 +13,6 @@ from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.record import record
 from robot_layouts.data.recording.replaying import replay_recording
 from tests.data.plays import Here
-from tests.data.recordings import edited
 from tests.data.recordings import record as record_at_random
 from tests.data.test_record import PATIENCE, ROOT, wait_for_parts, wait_until_nobody_is_left
 from tests.data.test_recorder import same_files
@@ -59,17 +58,6 @@ def test_what_was_recorded_before_is_not_played(pushed: Path, tmp_path: Path, ca
     assert "2 of 5 episodes were recorded before" in captured.err
     assert "3 of 3 episodes end as recorded" in captured.out
     assert replay(pushed, tmp_path) == 0  # nothing is left to play
-
-
-@pytest.mark.long
-def test_an_episode_that_differs_is_left_out_by_workers_too(pushed: Path, tmp_path: Path, capsys):
-    path = record_at_random(tmp_path / "changed" / FILE, "PushCube-v1", [4, 3, 5])
-    with edited(path) as file:
-        file["traj_1/actions"][1] = 0.5
-    assert replay(path, tmp_path / "seen", "--workers=2") == 1
-    assert "3 of 3 episodes end as recorded; in 2 all states" in capsys.readouterr().out
-    with Recording(tmp_path / "seen") as file:
-        assert file.seeds == (10, 12)
 
 
 def test_episodes_without_seeds_of_their_own_are_played_here(pushed: Path, tmp_path: Path, capsys):

@@ -9,8 +9,8 @@ import pytest
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.data.dataset.contents import chosen_places, measure, numbers_of, read_contents
-from robot_layouts.data.dataset.report import histogram, make_report
+from robot_layouts.data.dataset.contents import chosen_places, measure, read_contents
+from robot_layouts.data.dataset.report import make_report
 from robot_layouts.data.playing.replay import open_recording
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.recording.recorder import Recorder
@@ -94,21 +94,3 @@ def test_a_recording_without_episodes(tmp_path):
     Recorder(tmp_path / "trajectory.h5", tasks.make("PushT-v1")).close()
     with pytest.raises(RobotLayoutsError, match="holds no episodes; there is nothing to report"):
         make_report(tmp_path)
-
-
-def test_all_values_are_in_a_histogram():
-    random = np.random.default_rng(0)
-    for values in (random.normal(size=50), random.integers(0, 100, 70), np.full(3, 2.5)):
-        failed = np.arange(len(values)) % 3 == 0
-        chart = histogram(values.astype(float), failed, "a & b")
-        pairs = re.findall(r"<title>[^<]*: ([\d,]+) succeeded(?:, ([\d,]+) failed)?", chart)
-        bars = {pair for pair in re.findall(r"<title>([^<]*)</title>", chart)}
-        counted = [re.findall(r": (\d+) succeeded(?:, (\d+) failed)?", bar)[0] for bar in bars]
-        assert pairs
-        assert sum(int(a) + int(b or 0) for a, b in counted) == len(values)
-        assert "a &amp; b" in chart
-
-
-def test_numbers_of_what_was_drawn():
-    drawn = {"mass": {"cube": 2}, "lights": [{"on": True}, [0.5, "red"]], "name": "x"}
-    assert dict(numbers_of(drawn)) == {"mass/cube": 2.0, "lights[0]/on": 1.0, "lights[1][0]": 0.5}

@@ -235,7 +235,6 @@ def test_the_instruction_is_the_one_of_the_seed(tmp_path, monkeypatch, seed):
     ("address", "error", "message"),
     [
         ("ws://", TaskError, "the policy's address is 'ws://'; it must be ws://HOST:PORT or wss"),
-        ("ws://host:port", TaskError, "must be ws://HOST:PORT"),
         ("http://host:80", TaskError, "'http://host:80'; it must be ws://HOST:PORT or wss://HOST"),
         ("ws://host:80#alhoa", TaskError, "Did you mean 'aloha'"),
         ("ws://host:80#none.yaml", TaskError, "cannot read the keys 'none.yaml'"),
@@ -250,13 +249,10 @@ def test_wrong_addresses(address, error, message):
     ("text", "error", "message"),
     [
         ("", TaskError, "observation is missing: what the server is sent, by key"),
-        ("observation: 3", TaskError, "observation"),
         ("observation: {a: 3}", TaskError, "observation: a is"),
         ("observation: {a: {joint: [left]}}", UnknownNameError, "Did you mean 'joints'"),
         ("observation: {a: {joints: [left], text: x}}", TaskError, "it must have one source"),
-        ("observation: {a: {text: x}}\nstep: 2", UnknownNameError, "Did you mean 'steps'"),
         ("observation: {a: {text: x}}\nsteps: 0", TaskError, "steps"),
-        ("observation: {a: {text: x}}\ngripper: {open: 1}", TaskError, "closed"),
         ("observation: {a: {camera: x, order: hcw}}", TaskError, "it must be 'chw'"),
     ],
 )

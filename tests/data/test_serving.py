@@ -19,7 +19,6 @@ from websockets.sync.client import connect
 
 import tasks
 from layouts.commands import Server
-from robot_layouts.__main__ import main
 from robot_layouts.data.playing.served.client import pack, unpack
 from robot_layouts.data.serving import client
 from robot_layouts.data.serving.client import (
@@ -30,7 +29,6 @@ from robot_layouts.data.serving.client import (
 )
 from robot_layouts.data.serving.server import MOST_BYTES, Admission, serve
 from robot_layouts.simulation.rendering import vulkan_problem
-from robots import TaskError
 from tasks.interfaces.gymnasium import info_row, row
 from tests.data import expert_plays
 from tests.data.plays import at_random
@@ -102,15 +100,8 @@ def test_what_is_served_is_said_first(env):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda env: env.step(np.zeros(8)), "shape"),
-        (lambda env: env.step(np.full(7, np.nan)), "action number 0 is nan"),
-        (lambda env: env.step({"amr": np.zeros(7)}), "amr"),
         (lambda env: env.step("left"), "numbers are needed"),
-        (lambda env: env.reset(seed=-1), "seed"),
-        (lambda env: env.reset(seed=[1, 2]), "seed"),
         (lambda env: env._ask({"call": "rest"}), "Did you mean 'reset'?"),
-        (lambda env: env._ask({"call": "step", "actoin": 1}), "Did you mean 'action'?"),
-        (lambda env: env._ask({}), "unknown call None"),
         (lambda env: env._ask(["reset"]), "a message is a mapping"),
     ],
 )
@@ -129,16 +120,6 @@ def test_bad_input_is_answered_in_a_sentence_and_the_world_is_kept(env, call, me
 def test_an_episode_has_to_begin(env):
     with pytest.raises(RemoteTaskError, match="no episode has begun; reset first"):
         env.step(np.zeros(7))
-
-
-@pytest.mark.parametrize("data", [b"\xc1", b"", "reset", pack(7), b"\x93" * 5000])
-def test_what_is_no_message_is_answered(address, data):
-    with connect(address) as socket:
-        socket.recv()
-        socket.send(data)
-        assert set(unpack(socket.recv(timeout=10))) == {"error"}
-        socket.send(pack({"call": "reset", "seed": 0}))
-        assert "observation" in unpack(socket.recv(timeout=60))
 
 
 def test_a_message_of_a_megabyte_is_not_read(address, env):
@@ -196,30 +177,6 @@ def test_only_those_with_the_token_come_in(address):
     with pytest.raises(RemoteTaskError) as error:
         RemoteEnv(f"ws://127.0.0.1:9/?token={token}")
     assert token not in str(error.value)
-
-
-def test_no_more_clients_come_in_than_it_takes(address):
-    held = [RemoteEnv(address) for _ in range(3)]
-    with pytest.raises(RemoteTaskError, match="As many clients as the server takes"):
-        RemoteEnv(address)
-    for one in held:
-        one.close()
-
-
-def test_a_web_page_does_not_come_in(address):
-    with pytest.raises(Exception, match="403"):
-        connect(address, origin="http://example.org")
-
-
-def test_a_port_that_is_in_use_is_named(address):
-    port = int(address.partition("/?")[0].rpartition(":")[2])
-    with pytest.raises(TaskError, match=f"cannot listen at 127.0.0.1:{port}: .*; choose --host or"):
-        serve(TASK, server=Server(port=port), on_ready=print)
-
-
-def test_a_wrong_task_is_refused_before_anything_is_served(capsys):
-    assert main(["serve", "PushTee-v1"]) == 2
-    assert "Did you mean 'PushT-v1'?" in capsys.readouterr().err
 
 
 @pytest.mark.long

@@ -26,12 +26,12 @@ from robot_layouts.data.reading.hub import HubError
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.receipts import Receipt, verify
 from robots import TaskError, UnreadableFileError
-from tests.data.writable_hub import TOKEN, WritableHub
+from tests.data.writable_hub import WritableHub
 
 TASK, NAME = "PushCube-v1", "lab/push"
 HOW = {"control_mode": "pd_joint_pos", "obs_mode": "state_dict", "workers": 0}
 WORDS = ["--control-mode", "pd_joint_pos", "--obs-mode", "state_dict", "--workers", "0"]
-SETTINGS = {"HF_HUB_DISABLE_XET": "1", "HF_TOKEN": TOKEN, "NO_PROXY": "127.0.0.1"}
+
 DECLARED = {
     "format": "robot-layouts policy 1",
     "task": TASK,
@@ -68,19 +68,6 @@ def network(seed: int = 0) -> dict[str, np.ndarray]:
 def folder(tmp_path: Path) -> Path:
     save_policy(tmp_path / "shared", DECLARED, network())
     return tmp_path / "shared"
-
-
-@pytest.fixture
-def hub(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[WritableHub]:
-    from huggingface_hub import constants
-
-    monkeypatch.setattr(constants, "HF_HUB_CACHE", str(tmp_path / "hf_home/hub"))
-    monkeypatch.setattr(constants, "HF_HUB_DISABLE_XET", True)
-    with WritableHub({}) as server:
-        places = {"HF_HOME": str(tmp_path / "hf_home"), "HF_ENDPOINT": server.endpoint}
-        for name, value in (SETTINGS | places).items():
-            monkeypatch.setenv(name, value)
-        yield server
 
 
 def upload(hub: WritableHub, folder: Path) -> str:
@@ -170,7 +157,6 @@ def test_what_it_did_not_learn_is_refused(folder, changed, message):
     ("observed", "message"),
     [
         ([{"key": "extra/cube_pose"}], "observes 'extra/cube_pose', which is not observed here"),
-        ([{"key": "agent/qpos/x"}], "observes 'agent/qpos/x', which is not"),
         ([{"key": "agent/qpos"}], "observes 21 numbers; here are 9"),
     ],
 )
@@ -187,9 +173,7 @@ def test_what_is_not_observed_is_named(tmp_path, observed, message):
         ({"played": 0}, "played is 0"),
         ({"observed": [{"key": "a", "symmetry": "ball"}]}, "symmetry"),
         ({"width": 5}, "lack a tensor 'network.0.weight' of the shape \\[5, 21\\]"),
-        ({"blocks": 0}, "lack a tensor 'network.2.weight'"),
         ({"switches": [24]}, "its chunks have no number 24"),
-        ({"task": None}, "task"),
     ],
 )
 def test_a_declaration_that_is_none_is_refused(folder, changed, message):
@@ -250,16 +234,11 @@ def tensor(**changed: object) -> dict[str, object]:
         b"",
         (2**40).to_bytes(8, "little") + b"{}",
         of_header(b"{"),
-        of_header(b"\xff\xff"),
         of_header(b"[" * 5000),
-        of_header([1]),
         of_header({"a": tensor(dtype="F31")}),
         of_header({"a": tensor(shape=[3])}),
-        of_header({"a": tensor(shape=[-2])}),
-        of_header({"a": tensor(data_offsets=[0])}),
         of_header({"a": tensor(), "b": tensor()}),
         of_header({"a": tensor()}, bytes(4)),
-        of_header({"a": tensor()}, bytes(12)),
     ],
 )
 def test_a_file_that_is_no_safetensors_is_refused(tmp_path, content):

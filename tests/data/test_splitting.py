@@ -10,17 +10,11 @@ import h5py
 import pytest
 
 import tasks
-from robot_layouts.data.reading.json_files import (
-    manifest_path,
-    matches,
-    read_manifest,
-    seeds_of,
-    spans_of,
-)
+from robot_layouts.data.reading.json_files import manifest_path, matches, read_manifest, seeds_of
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording import recorder as recorders
 from robot_layouts.data.recording.recorder import Recorder
-from robots import RecordingError, TaskError
+from robots import RecordingError
 from tests.data.kills import Kill, Killed
 from tests.data.test_recorder import short_episode
 
@@ -87,10 +81,9 @@ def test_what_fits_into_one_file_has_no_manifest(tmp_path, push_t):
     assert sorted(contents(path)) == ["trajectory.h5", "trajectory.json"]
 
 
-@pytest.mark.parametrize("shuffled", [1, 2, 3])
-def test_expected_episodes_may_come_in_any_order(tmp_path, push_t, straight, shuffled):
+def test_expected_episodes_may_come_in_any_order(tmp_path, push_t, straight):
     env, episodes = push_t
-    crooked = random.Random(shuffled).sample(episodes, COUNT)
+    crooked = random.Random(1).sample(episodes, COUNT)
     path = tmp_path / "trajectory.h5"
     with Recorder(path, env, file_size=SIZE) as recorder:
         recorder.expect(range(COUNT))
@@ -208,13 +201,6 @@ def test_overwriting_takes_all_files_away(tmp_path, push_t, straight):
     assert sorted(contents(path)) == ["trajectory.h5", "trajectory.json"]
 
 
-def test_another_task_is_refused(tmp_path, push_t, straight):
-    path = copied(straight, tmp_path)
-    with pytest.raises(RecordingError, match='env_id: recorded "PushT-v1", here "PullCube-v1"'):
-        Recorder(path, tasks.make("PullCube-v1"), resume=True, file_size=SIZE)
-    assert contents(path) == contents(straight)
-
-
 @pytest.mark.long
 def test_a_kill_at_any_moment_loses_nothing(tmp_path, push_t, straight, monkeypatch):
     """Stop at every change of the disk, as a kill would, while files fill up out of order."""
@@ -264,14 +250,3 @@ def test_each_file_says_who_played_its_own_episodes(tmp_path, push_t):
         ("mixed", "ann; bob"),
         ("human", "bob"),
     ]
-
-
-def test_a_size_that_makes_no_sense(tmp_path, push_t):
-    with pytest.raises(TaskError, match=r"file_size is 0; it must be MB, more than 0"):
-        Recorder(tmp_path / "a.h5", push_t[0], file_size=0)
-
-
-def test_seeds_as_ranges():
-    assert spans_of([]) == []
-    assert spans_of([3]) == [[3, 3]]
-    assert spans_of([0, 1, 2, 5, 7, 8]) == [[0, 2], [5, 5], [7, 8]]

@@ -62,15 +62,6 @@ def expect_replay(folder, task_id):
         task.close()
 
 
-def test_pick_cube_is_solved_by_hand(tmp_path):
-    with hands_on("PickCube-v1", tmp_path) as (hands, model):
-        cube, goal = pose_of(model, "cube"), pose_of(model, "goal_site")
-        hands.turn("arm", yaw_between(hands.turns["arm"], cube[3:]))
-        grasp(hands, "arm", cube[:3])
-        hands.bring("arm", goal[:3])
-    expect_replay(tmp_path, "PickCube-v1")
-
-
 def test_two_robot_pick_cube_is_solved_by_hand(tmp_path):
     with hands_on("TwoRobotPickCube-v1", tmp_path) as (hands, model):
         cube, goal = pose_of(model, "cube"), pose_of(model, "goal_site")

@@ -12,16 +12,7 @@ from robot_layouts.data.playing.replay import replay
 from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.simulation.rendering import Observers
-from tasks import (
-    CameraShift,
-    Distractors,
-    Light,
-    Randomization,
-    Surface,
-    Texture,
-    Uniform,
-    Whole,
-)
+from tasks import CameraShift, Distractors, Light, Randomization, Surface, Texture, Uniform, Whole
 
 TASK, SEED = "PickCube-v1", 3
 VARIED = Randomization(

@@ -83,13 +83,6 @@ def test_a_recording_of_another_task(recording, capsys):
 
 
 @pytest.mark.long
-def test_a_page_is_saved(recording, tmp_path, capsys):
-    path = tmp_path / "episode.html"
-    assert main(["view", str(recording), "--html", str(path)]) == 0
-    assert "<title>TwoRobotPickCube-v1, episode 0 of trajectory.h5</title>" in path.read_text()
-
-
-@pytest.mark.long
 def test_tasks_hand_a_demonstration_over(recording):
     words = ("tasks", "view", TWO_ROBOTS, "--demo", str(recording), "--episode", "1")
     with served("robot_layouts", *words, "--port", "0") as view:

@@ -10,10 +10,17 @@ import hashlib
 import json
 import re
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
+from unittest import mock
 from urllib.parse import unquote, urlsplit
 
+from huggingface_hub import constants
+
+from robot_layouts.data.reading import hub as reading
 from tests.robots.hub_server import Handler, HubServer
 
 TOKEN = "hf_must_never_be_printed"
@@ -204,3 +211,23 @@ class _WritableHandler(Handler):
 
 
 WritableHub.handler = _WritableHandler
+
+
+@contextmanager
+def running_hub(folder: Path, **settings: object) -> Iterator[WritableHub]:
+    """Run a Hub that this process finds, with a token, and a cache of its own in a folder.
+
+    Args:
+        folder: Where the client keeps what it has read.
+        settings: More constants of the client, such as how long it waits.
+    """
+    with WritableHub({}) as server:
+        places = {"HF_HOME": str(folder / "hf_home"), "HF_ENDPOINT": server.endpoint}
+        own = {"HF_HUB_DISABLE_XET": "1", "HF_TOKEN": TOKEN, "NO_PROXY": "127.0.0.1", **places}
+        cache = {"HF_HUB_CACHE": str(folder / "hf_home/hub"), "HF_HUB_DISABLE_XET": True}
+        reading._downloaded.cache_clear()
+        with (
+            mock.patch.dict("os.environ", own),
+            mock.patch.multiple(constants, **cache, **settings),
+        ):
+            yield server

@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import tasks
 from robots import RobotLayoutsError
-from tests.faults.fault import GOES_ON, Fault
+from tasks.maniskill.pick_cube import PickCube
+from tests.faults.fault import Fault
 
 AREA = "arguments"
 ONE, TWO = "PickCube-v1", "TwoRobotPickCube-v1"
@@ -29,70 +31,36 @@ NOT_FINITE = (math.nan, math.inf, -math.inf)
 
 # What an entry may not be: from the entry as it is, (2, k).
 SPOILT: dict[str, Callable[[Any], Any]] = {
-    "a list of zeros": lambda x: [[0.0] * x.shape[1]] * 2,
-    "integers that are zero": lambda x: np.zeros(x.shape, int),
     "one row too few": lambda x: x[:1],
-    "one row too many": lambda x: np.concatenate([x, x[:1]]),
     "one number too few": lambda x: x[:, :-1],
-    "one number too many": lambda x: np.concatenate([x, x[:, :1]], 1),
     "another dimension": lambda x: x[None],
     "a single row": lambda x: x[0],
-    "nothing": lambda x: None,
     "a number": lambda x: 5,
     "a text": lambda x: "home",
     "texts": lambda x: x.astype(str),
-    "truth values": lambda x: x.astype(bool),
     "complex numbers": lambda x: x.astype(complex),
-    "objects": lambda x: x.astype(object),
-    "bytes": lambda x: x.tobytes(),
     "a ragged list": lambda x: [x[0].tolist(), [0.0]],
-    "a dict": lambda x: {"pose": x},
-    "an empty list": lambda x: [],
     "a zero quaternion": lambda x: _with(x, slice(3, 7), 0.0),
     "a short quaternion": lambda x: _with(x, slice(3, 7), (0.5, 0.0, 0.0, 0.0)),
-    "a long quaternion": lambda x: _with(x, slice(3, 7), (2.0, 0.0, 0.0, 0.0)),
-    "a quaternion of 1e30": lambda x: _with(x, slice(3, 7), (1e30, 0.0, 0.0, 0.0)),
     "a position of 1e30 m": lambda x: _with(x, 0, 1e30),
-    "a position of 1e300 m": lambda x: _with(x.astype(float), 0, 1e300),
     "a velocity of 1e30 m/s": lambda x: _with(x, 7, 1e30),
 }
 SPOILT_JOINTS: dict[str, Callable[[Any], Any]] = {
-    "joints at 1e30": lambda x: _with(x, slice(13, 22), 1e30),
     "a joint at 1e9": lambda x: _with(x, 14, 1e9),
     "joints in degrees": lambda x: _with(x, slice(13, 20), 90.0),
     "fingers at 100 m": lambda x: _with(x, 21, 100.0),
-    "joint speeds of 1e30": lambda x: _with(x, slice(22, 31), 1e30),
 }
 SPOILT_STATES: dict[str, Callable[[Any], Any]] = {
     "None": lambda s: None,
-    "a list": lambda s: [s],
     "a number": lambda s: 5,
-    "a text": lambda s: "start",
-    "a list of groups": lambda s: list(s),
     "an unknown group": lambda s: {**s, "actor": {}},
-    "a group that is a number": lambda s: {1: {}},
     "a group of nothing": lambda s: {**s, "actors": None},
-    "a group that is a list": lambda s: {**s, "actors": [1, 2]},
     "an entry as the group": lambda s: {"actors": s["actors"]["cube"]},
     "an unknown body": lambda s: {"actors": {"cub": s["actors"]["cube"]}},
-    "a body that is a number": lambda s: {"actors": {5: s["actors"]["cube"]}},
     "a body among the robots": lambda s: {"articulations": {"cube": s["actors"]["cube"]}},
     "a good body before an unknown one": lambda s: {
         "actors": {"cube": s["actors"]["cube"] * 1, "nobody": s["actors"]["cube"]}
     },
-}
-# What is a state all the same.
-GOOD: dict[str, Callable[[Any], Any]] = {
-    "as it is": lambda s: s,
-    "twice as exact": lambda s: _each(s, lambda x: x.double()),
-    "as lists": lambda s: _each(s, lambda x: x.tolist()),
-    "as arrays": lambda s: _each(s, lambda x: x.numpy()),
-    "in another order": lambda s: {g: dict(reversed(e.items())) for g, e in reversed(s.items())},
-    "only a part": lambda s: {"actors": {"cube": s["actors"]["cube"]}},
-    "with gradients": lambda s: _each(s, lambda x: x.clone().requires_grad_()),
-    "nothing at all": lambda s: {},
-    "quaternions of four digits": lambda s: _each(s, lambda x: _rounded(x)),
-    "joints a little beyond their limits": lambda s: _beyond(s),
 }
 
 
@@ -116,33 +84,18 @@ def faults() -> Iterator[Fault]:
                     yield Fault(AREA, what, partial(_set, task_id, group, key, spoil))
     for name, spoil in SPOILT_STATES.items():
         yield Fault(AREA, f"state: {name}", partial(_set_all, spoil))
-    for name, change in GOOD.items():
-        yield Fault(AREA, f"state: {name}", partial(_goes_back, change), GOES_ON)
     for mode in ("normalized_dense", "dense"):
-        for value in NOT_FINITE:
-            for env in (0, 1):
-                what = f"a {mode} reward of {value} in environment {env}"
-                yield Fault(AREA, what, partial(_bad_reward, mode, value, env))
-    for name, earned in {"nan": math.nan, "inf": math.inf, "None": None, "a text": "1,5"}.items():
-        yield Fault(AREA, f"a robot's own reward of {name}", partial(_robot_reward, earned))
+        for value in NOT_FINITE[:2]:
+            what = f"a {mode} reward of {value} in environment 1"
+            yield Fault(AREA, what, partial(_bad_reward, mode, value, 1))
     for obs_mode in ("state", "state_dict"):
-        for value in NOT_FINITE:
-            for call in ("reset", "step"):
-                what = f"an observation of {value} at a {call}, {obs_mode}"
-                yield Fault(AREA, what, partial(_bad_observation, obs_mode, value, call))
-    for obs_mode in ("state", "state_dict", "none"):
-        what = f"a body that physics loses, {obs_mode}"
-        yield Fault(AREA, what, partial(_lost, obs_mode))
-    yield Fault(AREA, "a reward of 1e30, which is finite", _large_reward, GOES_ON)
-    yield Fault(AREA, "a world that physics lost is rebuilt", _found_again, GOES_ON)
-    for key in ("seed", "reconfigure"):
-        yield Fault(AREA, f"evaluate() returns {key!r}", partial(_taken, key))
+        for call in ("reset", "step"):
+            what = f"an observation of nan at a {call}, {obs_mode}"
+            yield Fault(AREA, what, partial(_bad_observation, obs_mode, math.nan, call))
 
 
 @functools.cache
 def _task(task_id: str) -> Any:
-    import tasks
-
     return tasks.make(task_id, num_envs=2)
 
 
@@ -155,21 +108,6 @@ def _with(array: Any, place: Any, value: Any) -> Any:
     changed = np.array(array)
     changed[1, place] = value
     return changed
-
-
-def _each(state: Any, change: Callable[[Any], Any]) -> Any:
-    return {g: {k: change(x) for k, x in entries.items()} for g, entries in state.items()}
-
-
-def _rounded(entry: Any) -> Any:
-    entry[:, 3:7] = (entry[:, 3:7] * 1e4).round() / 1e4
-    return entry
-
-
-def _beyond(state: Any) -> Any:
-    state["articulations"]["panda"][:, 20:22] = -0.002  # fingers (m)
-    state["articulations"]["panda"][:, 16] = 0.1  # rad; the fourth joint ends at -0.07
-    return state
 
 
 def _set(task_id: str, group: str, key: str, spoil: Callable[[Any], Any], folder: Path) -> None:
@@ -202,28 +140,8 @@ def _refused_whole(env: Any, state: Any) -> None:
         raise
 
 
-def _goes_back(change: Callable[[Any], Any], folder: Path) -> str:
-    env = _task(ONE)
-    env.reset(seed=0)
-    env.step(np.ones((2, 8), np.float32))
-    state = _state(env)
-    wanted = change(state)
-    env.reset(seed=1)
-    env.set_state_dict(wanted)
-    got = env.get_state_dict()
-    for group, entries in wanted.items():
-        for key, rows in entries.items():
-            given = rows.detach().numpy() if hasattr(rows, "detach") else rows
-            np.testing.assert_allclose(got[group][key], np.asarray(given), atol=1e-4)
-    obs, *_ = env.step(np.zeros((2, 8), np.float32))
-    assert obs.isfinite().all()
-    return "set, and the next step is finite"
-
-
 def _spoilt_task(**methods: Any) -> Any:
     """Make PickCube with other methods, two environments."""
-    from tasks.maniskill.pick_cube import PickCube
-
     return type("Mine", (PickCube,), methods)
 
 
@@ -248,64 +166,6 @@ def _bad_observation(obs_mode: str, value: float, call: str, folder: Path) -> No
     if call == "reset":
         _made(cls, obs_mode=obs_mode)
     _expect_step(_made(cls, obs_mode=obs_mode), 2, "'goal' is .* in environment 1 at step 2")
-
-
-def _robot_reward(earned: Any, folder: Path) -> None:
-    import tasks
-
-    env = tasks.parallel_env(ONE, robot_reward=lambda *_: earned)
-    env.reset(seed=0)
-    env.step({"arm": np.zeros(8, np.float32)})
-
-
-def _lost(obs_mode: str, folder: Path) -> None:
-    from tasks.maniskill.pick_cube import PickCube
-
-    task = _made(PickCube, obs_mode=obs_mode)
-    task.step(np.zeros((2, 8), np.float32))
-    _lose(task)
-    _expect_step(task, 1, "body 'cube' has numbers that are not finite in environment 1 at step 2")
-
-
-def _lose(task: Any) -> None:
-    """Push a body so that physics cannot follow."""
-    from robot_layouts.simulation.sapien3.backend import worlds_below
-
-    cube = worlds_below(task.simulation)[1].bodies["cube"].component
-    cube.set_linear_velocity([math.inf, 0.0, 0.0])
-
-
-def _found_again(folder: Path) -> str:
-    from tasks.maniskill.pick_cube import PickCube
-
-    task, other = _made(PickCube), _made(PickCube)
-    _lose(task)
-    with pytest.raises(RobotLayoutsError, match="physics diverged"):
-        task.step(np.zeros((2, 8), np.float32))
-    rebuilt = {"reconfigure": True}
-    assert (task.reset(seed=4, options=rebuilt)[0] == other.reset(seed=4, options=rebuilt)[0]).all()
-    action = np.ones((2, 8), np.float32)
-    for _ in range(5):
-        assert (task.step(action)[0] == other.step(action)[0]).all()
-    return "as if nothing had happened, to the last bit"
-
-
-def _large_reward(folder: Path) -> str:
-    def dense_reward(self: Any, state: Any, action: Any, info: Any) -> Any:
-        return np.full(self.num_envs, 1e30, np.float32)
-
-    task = _made(_spoilt_task(dense_reward=dense_reward), reward_mode="dense")
-    assert task.step(np.zeros((2, 8), np.float32))[1].tolist() == [np.float32(1e30)] * 2
-    return "a reward of 1e30"
-
-
-def _taken(key: str, folder: Path) -> None:
-    from tasks.maniskill.pick_cube import PickCube
-
-    def evaluate(self: Any, state: Any) -> Any:
-        return {**PickCube.evaluate(self, state), key: np.zeros(self.num_envs)}
-
-    _made(_spoilt_task(evaluate=evaluate))
 
 
 def _made(cls: Any, **fields: Any) -> Any:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import functools
 import math
-import os
-import socket
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -32,9 +30,9 @@ def faults() -> Iterator[Fault]:
     yield from _wrong_policies()
 
 
-NO_COUNT = (-1, -(10**9), True, 2.5, "2", math.nan, math.inf, [1], b"1")
-NO_SECONDS = (0, -1, True, "5", math.nan, math.inf, -math.inf, [1])
-NO_SEEDS = (5, None, [0.5], ["a"], "ab", [-1], [2**32], [1, 2, 1], [None], [[1]])
+NO_COUNT = (-1, True, 2.5, "2", math.nan)
+NO_SECONDS = (0, True, "5", math.nan, math.inf)
+NO_SEEDS = (5, None, [0.5], "ab", [-1], [2**32], [1, 2, 1])
 
 
 # -- wrong arguments ------------------------------------------------------------------------------
@@ -60,11 +58,9 @@ def _wrong_arguments() -> Iterator[Fault]:
     yield fault_of("an executor and a deadline", evaluated, executor=Nobody(), episode_timeout=5.0)
     for words in (
         ["--workers=-1"],
-        ["--workers=two"],
         ["--episode-timeout=0"],
         ["--workers=0", "--episode-timeout=9"],
         ["--ray=local"],
-        ["--ray="],
         ["--ray=127.0.0.77:1"],
     ):
         yield Fault(AREA, f"evaluate {' '.join(words)}", functools.partial(_command, words))
@@ -115,18 +111,12 @@ def _recurse(obs: Any) -> Any:
 
 _POLICIES: dict[str, Any] = {
     "raises KeyError": functools.partial(_raise, KeyError("no such key")),
-    "raises without words": functools.partial(_raise, AssertionError()),
     "raises what cannot be pickled": _raise_secret,
-    "raises StopIteration": functools.partial(_raise, StopIteration()),
-    "runs out of memory": functools.partial(_raise, MemoryError()),
     "calls itself for ever": _recurse,
     "returns nothing": lambda obs: None,
     "returns a word": lambda obs: "left",
     "returns too few numbers": lambda obs: [0.0] * 3,
-    "returns a matrix": lambda obs: [[0.0] * 7] * 7,
     "returns NaN": lambda obs: [math.nan] * 7,
-    "returns infinity": lambda obs: [math.inf] * 7,
-    "returns 1e300": lambda obs: [1e300] * 7,
     "takes no argument": lambda: [0.0] * 7,
 }
 
@@ -147,18 +137,7 @@ class _Holds:
 
 _UNSENDABLE: dict[str, Callable[[], Any]] = {
     "a lambda": lambda: lambda obs: obs,
-    "a local function": lambda: functools.partial(_local, 1)(),
     "a lock's holder": lambda: _Holds(threading.Lock()),
-    "a generator's holder": lambda: _Holds(x for x in ()),
-    "a socket's holder": lambda: _Holds(socket.socket()),
-    "a module's holder": lambda: _Holds(os),
     "what refuses to be pickled": _Refuses,
     "what no worker can import": Elsewhere,
 }
-
-
-def _local(number: int) -> Any:
-    def policy(obs: Any) -> int:
-        return number
-
-    return policy

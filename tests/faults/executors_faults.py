@@ -8,6 +8,8 @@ import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
+from robot_layouts.data.playing.executor import ProcessExecutor
+from robot_layouts.data.reading.recording import Recording
 from robots import RobotLayoutsError
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.players import AREA, Mischief, Nobody, evaluated, expect_squares, recorded
@@ -29,10 +31,10 @@ def _deaths() -> Iterator[Fault]:
         run = functools.partial(_plays_again, f"signal {name}")
         yield Fault(AREA, f"an episode gets {name}", run, GOES_ON)
     yield Fault(AREA, "an episode is stopped for a while", _naps, GOES_ON)
-    for what in ("exit 0", "exit 3", "busy", "lock", "sleep", "fifo", "half an answer"):
+    for what in ("exit 0", "busy", "lock", "fifo", "half an answer"):
         run = functools.partial(_plays_again, what)
         yield Fault(AREA, f"an episode's end: {what}", run, GOES_ON)
-    for what in ("signal SIGKILL", "exit 5", "sleep", "signal SIGSTOP"):
+    for what in ("signal SIGKILL", "exit 5", "sleep"):
         run = functools.partial(_gives_up, what, during="play")
         yield Fault(AREA, f"every worker at one seed: {what}", run)
     for what in ("signal SIGKILL", "exit 5"):
@@ -43,21 +45,15 @@ def _deaths() -> Iterator[Fault]:
 
 
 def _plays_again(what: str, folder: Path, during: str = "play") -> str:
-    from robot_layouts.data.playing.executor import ProcessExecutor
-
     executor = ProcessExecutor(1, episode_timeout=1.0)
     return expect_squares(executor, Mischief(folder, what, during))
 
 
 def _naps(folder: Path) -> str:
-    from robot_layouts.data.playing.executor import ProcessExecutor
-
     return expect_squares(ProcessExecutor(1), Mischief(folder, "nap", "play"), deaths=0)
 
 
 def _gives_up(what: str, folder: Path, during: str) -> None:
-    from robot_layouts.data.playing.executor import ProcessExecutor
-
     executor = ProcessExecutor(1, attempts=2, episode_timeout=0.3)
     for event in executor.run(Mischief(folder, what, during, again=True), range(3)):
         if event.error is not None:
@@ -104,16 +100,6 @@ _PROGRAMS = {
         _OPENING + "\nplay()\n",
         GOES_ON,
     ),
-    "a daemonic process plays": (
-        _OPENING
-        + """
-if __name__ == "__main__":
-    process = multiprocessing.get_context("fork").Process(target=play, daemon=True)
-    process.start()
-    process.join()
-""",
-        GOES_ON,
-    ),
     "no file can be opened any more": (
         _OPENING
         + """
@@ -124,17 +110,6 @@ if __name__ == "__main__":
     play()
 """,
         "one clear error",
-    ),
-    "Python cannot be started any more once workers have played": (
-        _OPENING
-        + """
-if __name__ == "__main__":
-    list(ProcessExecutor(1).run(Play(), [0]))
-    sys.executable = "/no/such/python"
-    multiprocessing.set_executable("/no/such/python")
-    play()
-""",
-        GOES_ON,
     ),
     "the program is stopped for longer than an episode may take": (
         _OPENING
@@ -225,8 +200,6 @@ def _with_executor(what: str, folder: Path) -> None:
 
 
 def _recording_with_forgetful_executor(folder: Path) -> None:
-    from robot_layouts.data.reading.recording import Recording
-
     executor = Nobody()
     executor.what = "forgets one"
     try:

@@ -53,10 +53,7 @@ def faults() -> Iterator[Fault]:
 _TRIANGLE: Corners = [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0)]
 _MESHES: Mapping[str, tuple[Corners, Faces]] = {
     "a triangle": (_TRIANGLE, [(0, 1, 2)]),
-    "a triangle, twice and from behind": (_TRIANGLE, [(0, 1, 2), (0, 1, 2), (2, 1, 0)]),
-    "a square": ([*_TRIANGLE, (0.1, 0.1, 0)], [(0, 1, 2), (1, 3, 2)]),
     "a line": ([(0, 0, 0), (0.1, 0, 0), (0.2, 0, 0)], [(0, 1, 2)]),
-    "a point": ([(1, 1, 1)] * 4, [(0, 1, 2), (1, 2, 3)]),
     "less than single precision": (
         [(500, 500, 500), (500.00001, 500, 500), (500, 500.00001, 500)],
         [(0, 1, 2)],
@@ -67,12 +64,8 @@ _MESHES: Mapping[str, tuple[Corners, Faces]] = {
 _FAR = {"1e30 m": (0.0, 0.0, 1e30), "1e200 m": (0.0, 1e200, 0.0), "20 km": (2e4, 0.0, 0.0)}
 _DRIVES: Mapping[str, Mapping[str, float]] = {
     "no stiffness": {"stiffness": 0.0},
-    "no damping": {"damping": 0.0},
     "no force": {"force_limit": 0.0},
     "a stiffness of 1e30": {"stiffness": 1e30},
-    "a damping of 1e30": {"damping": 1e30},
-    "an armature of 1e30": {"armature": 1e30},
-    "3e38 of everything": {"stiffness": 3e38, "damping": 3e38, "force_limit": 3e38},
 }
 
 
@@ -170,7 +163,6 @@ if find_spec("pxr"):
 _PLACES: Mapping[str, Callable[[Path], object]] = {
     "a folder that is a file": lambda out: out.touch(),
     "a folder that is a link to itself": lambda out: out.symlink_to(out),
-    "a folder in /proc": lambda out: out.symlink_to("/proc"),
     "where folders and files have each other's names": lambda out: _swap(out),
 }
 

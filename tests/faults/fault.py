@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from robots import RobotLayoutsError
 
@@ -14,6 +16,23 @@ REFUSED = "one clear error"
 GOES_ON = "goes on"
 
 COMMAND_SECONDS = 90.0
+
+
+def sparse(path: Path) -> None:
+    """Make a file of 5 GB of nothing."""
+    path.touch()
+    os.truncate(path, 5 << 30)
+
+
+NO_FILES: dict[str, Callable[[Path], object]] = {
+    "missing": lambda path: None,
+    "a folder": Path.mkdir,
+    "a FIFO": os.mkfifo,
+    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
+    "a link to itself": lambda path: path.symlink_to(path),
+    "5 GB of nothing": sparse,
+}
+"""What is put to a path at which there is no file to read then."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +53,38 @@ class Fault:
     what: str
     run: Callable[[Path], str | None]
     promise: str = REFUSED
+
+
+def each(
+    area: str,
+    what: str,
+    run: Callable[[Path, Any], str | None],
+    values: Mapping[str, Any],
+    promise: str = REFUSED,
+) -> Iterator[Fault]:
+    """Go through faults of one kind: `run` tries each value, whose name is put into `what`."""
+    for name, value in values.items():
+        tried = what.replace("{}", name)
+        yield Fault(area, tried, lambda folder, value=value: run(folder, value), promise)
+
+
+def refused(
+    area: str, calls: Mapping[str, tuple[Callable[[Any], object], Iterable[Any]]]
+) -> Iterator[Fault]:
+    """Go through calls that must refuse each of some values, which is put into what is tried."""
+    for what, (call, values) in calls.items():
+        for value in values:
+            tried = what.replace("{}", shown(value))
+            yield Fault(area, tried, lambda folder, call=call, value=value: _call(call, value))
+
+
+def _call(call: Callable[[Any], object], value: Any) -> None:
+    call(value)
+
+
+def shown(value: Any) -> str:
+    """Return a value as it is written, in one short line."""
+    return " ".join(repr(value).replace(repr(10**400), "10**400").split())[:80]
 
 
 def run_command(

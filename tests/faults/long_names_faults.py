@@ -9,6 +9,9 @@ from typing import Any
 
 import pytest
 
+import tasks
+from layouts import Layout, single
+from robots import RobotLayoutsError, RobotRegistry
 from tests.faults.fault import Fault
 
 AREA = "long names"
@@ -23,48 +26,21 @@ def faults() -> Iterator[Fault]:
 
 
 def _make(**arguments: Any) -> Any:
-    import tasks
-
     return tasks.make(**{"task_id": "PushCube-v1", **arguments})
 
 
-def _load(name: str) -> Any:
-    from robots import RobotRegistry
-
-    return RobotRegistry.load(name)
-
-
-def _layout(name: str) -> Any:
-    from layouts import single
-
-    return single({name: "panda"})
-
-
-def _yaml(text: str) -> Any:
-    from layouts import Layout
-
-    return Layout.from_yaml(text)
-
-
 _TAKES: dict[str, Callable[[str], Any]] = {
-    "a robot's name": _load,
+    "a robot's name": RobotRegistry.load,
     "a task's id": lambda name: _make(task_id=name),
-    "a place": lambda name: _make(robots={name: "panda"}),
     "a robot in a task": lambda name: _make(robots={"panda": name}),
-    "an obs_mode": lambda name: _make(obs_mode=name),
-    "a reward_mode": lambda name: _make(reward_mode=name),
     "a control_mode": lambda name: _make(control_mode=name),
-    "a simulator": lambda name: _make(simulator=name),
     "an argument": lambda name: _make(**{name: 1}),
-    "a number of environments": lambda name: _make(num_envs=name),
-    "a place in a layout": _layout,
-    "a layout in YAML": _yaml,
+    "a place in a layout": lambda name: single({name: "panda"}),
+    "a layout in YAML": Layout.from_yaml,
 }
 
 
 def _refused_in_short(take: Callable[[str], Any], _: Path) -> None:
-    from robots import RobotLayoutsError
-
     with pytest.raises(RobotLayoutsError) as caught:
         take(NAME)
     assert len(str(caught.value)) <= LONGEST

@@ -17,7 +17,7 @@ from tests.faults.toy_robots import build, check, guess, mesh, read_by_all, read
 
 AREA = "robot files"
 
-_NO_MESHES = ("pkl", "npz", "usd", "zip", "urdf", "sh", "3mf", "xyz", "zae", "STEP", "")
+_NO_MESHES = ("pkl", "usd", "zip", "sh", "3mf", "STEP", "")
 KINDS = ("stl", "obj", "dae", "glb", "gltf", "ply")
 Data = Callable[[], bytes]
 
@@ -32,7 +32,7 @@ def faults() -> Iterator[Fault]:
         yield _right(f"{kind.upper()}: good", kind.upper(), lambda k=kind: good(k))
     for ending in _NO_MESHES:
         yield _fault(f"a mesh that ends in {ending or 'nothing'}", ending, lambda: good("stl"))
-    for value in ("nan", "inf", "-inf", "1e30", "3e38", "1e6", "-1e5"):
+    for value in ("nan", "inf", "1e30", "-1e5"):
         for kind, change in _VERTICES.items():
             yield _fault(f"{kind}: a corner at {value} m", kind, lambda c=change, v=value: c(v))
     for what, (kind, data) in _BROKEN.items():
@@ -49,7 +49,7 @@ def faults() -> Iterator[Fault]:
 
 
 # What is as flat as a picture, and is left out.
-_FLAT = {"stl: one face", "stl: flat", "obj: flat", "glb: flat", "glb: a node of size 0"}
+_FLAT = {"glb: flat", "glb: a node of size 0"}
 # What trimesh makes sense of, and SAPIEN refuses.
 _READ_BY_TRIMESH = {"glb: a node below itself"}
 
@@ -110,13 +110,9 @@ def _other(kind: str) -> str:
 
 _DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda data: b"",
-    "its first half": lambda data: data[: len(data) // 2],
-    "its first tenth": lambda data: data[: len(data) // 10],
-    "one byte": lambda data: data[:1],
     "zeros": lambda data: bytes(len(data)),
     "random bytes": lambda data: bytes(i * i * 31 % 251 for i in range(5000)),
     "a list of users": lambda data: b"root:x:0:0:root:/root:/bin/bash\n" * 30,
-    "its second half": lambda data: data[len(data) // 2 :],
 }
 
 
@@ -126,29 +122,10 @@ def _stl_corner(value: str) -> bytes:
     return bytes(data)
 
 
-def _glb_corner(value: str) -> bytes:
-    data = bytearray(good("glb"))
-    length = struct.unpack_from("<I", data, 12)[0]
-    tree = json.loads(data[20 : 20 + length])
-    primitive = tree["meshes"][0]["primitives"][0]
-    accessor = tree["accessors"][primitive["attributes"]["POSITION"]]
-    view = tree["bufferViews"][accessor["bufferView"]]
-    struct.pack_into("<f", data, 28 + length + view.get("byteOffset", 0), float(value))
-    return bytes(data)
-
-
 _VERTICES: dict[str, Callable[[str], bytes]] = {
     "stl": _stl_corner,
-    "glb": _glb_corner,
     "obj": lambda value: re.sub(rb"(?m)^v \S+", f"v {value}".encode(), good("obj"), count=1),
 }
-
-
-def _obj(*lines: str) -> Data:
-    return lambda: "\n".join(lines).encode()
-
-
-_POINTS = ("v 0 0 0", "v 1 0 0", "v 0 1 0", "v 0 0 1")
 
 
 def _large() -> bytes:
@@ -157,16 +134,12 @@ def _large() -> bytes:
     return trimesh.creation.box((100, 100, 100)).export(file_type="stl")
 
 
-def _flat(ending: str) -> Data:
-    def made() -> bytes:
-        import trimesh
+def _flat() -> bytes:
+    import trimesh
 
-        data: Any = trimesh.Trimesh(
-            [[0, 0, 0], [1, 0, 0.5], [0, 1, 0], [1, 1, 0.5]], [[0, 1, 2], [1, 3, 2]], process=False
-        ).export(file_type=ending)
-        return data if isinstance(data, bytes) else data.encode()
-
-    return made
+    corners = [[0, 0, 0], [1, 0, 0.5], [0, 1, 0], [1, 1, 0.5]]
+    made: Any = trimesh.Trimesh(corners, [[0, 1, 2], [1, 3, 2]], process=False)
+    return made.export(file_type="glb")
 
 
 _BROKEN: dict[str, tuple[str, Data]] = {
@@ -174,38 +147,11 @@ _BROKEN: dict[str, tuple[str, Data]] = {
         "stl",
         lambda: good("stl")[:80] + b"\xff" * 4 + good("stl")[84:],
     ),
-    "stl: no faces": ("stl", lambda: good("stl")[:80] + bytes(4)),
-    "stl: one face": ("stl", lambda: good("stl")[:80] + b"\1\0\0\0" + good("stl")[84:134]),
-    "stl: bytes behind its end": ("stl", lambda: good("stl") + b"more"),
-    "stl: one byte less": ("stl", lambda: good("stl")[:-1]),
-    "stl: text that breaks off": (
-        "stl",
-        lambda: b"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0",
-    ),
-    "stl: flat": ("stl", _flat("stl")),
-    "obj: flat": ("obj", _flat("obj")),
-    "glb: flat": ("glb", _flat("glb")),
-    "obj: an index out of range": ("obj", _obj(*_POINTS, "f 1 2 999999999")),
-    "obj: a negative index out of range": ("obj", _obj(*_POINTS, "f -1 -2 -9")),
-    "obj: no faces": ("obj", _obj(*_POINTS)),
-    "obj: faces without corners": ("obj", _obj("f 1 2 3")),
-    "obj: corners that are words": ("obj", _obj("v a b c", "f 1 1 1")),
-    "obj: corners of two numbers": ("obj", _obj("v 0 0", "v 1 1", "f 1 2 1")),
+    "glb: flat": ("glb", _flat),
+    "obj: corners that are words": ("obj", lambda: b"v a b c\nf 1 1 1"),
     "ply: it announces 2 billion corners": (
         "ply",
         lambda: good("ply").replace(b"element vertex 8", b"element vertex 2147483647"),
-    ),
-    "ply: it announces 2 billion faces": (
-        "ply",
-        lambda: good("ply").replace(b"element face 12", b"element face 2147483647"),
-    ),
-    "ply: a list of no type": (
-        "ply",
-        lambda: good("ply").replace(b"property list", b"property lost"),
-    ),
-    "dae: billion laughs": (
-        "dae",
-        lambda: b'<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]>' + _collada(),
     ),
     "dae: an entity in UTF-16": (
         "dae",
@@ -214,20 +160,11 @@ _BROKEN: dict[str, tuple[str, Data]] = {
             + _collada().decode()
         ).encode("utf-16"),
     ),
-    "dae: no geometry": ("dae", lambda: b"<COLLADA/>"),
-    "glb: its chunk is 2 GB long": (
-        "glb",
-        lambda: good("glb")[:12] + b"\0\0\0\x80" + good("glb")[16:],
-    ),
-    "glb: another version": ("glb", lambda: good("glb")[:4] + b"\x63" + good("glb")[5:]),
     "gltf: its buffer is missing": (
         "gltf",
         lambda: re.sub(rb'"uri": ?"[^"]*"', b'"uri": "gone.bin"', good("gltf")),
     ),
-    "gltf: a list": ("gltf", lambda: b"[]"),
     "gltf: nested 10,000 deep": ("gltf", lambda: b'{"extras": ' + b"[" * 10_000),
-    "gltf: accessors that are a number": ("gltf", lambda: b'{"accessors": 5}'),
-    "gltf: accessors that are words": ("gltf", lambda: b'{"accessors": ["x"]}'),
 }
 
 
@@ -251,11 +188,9 @@ def _changed_glb(change: Callable[[dict[str, Any]], object]) -> bytes:
 
 def _gltf_changes() -> Iterator[tuple[str, Callable[[dict[str, Any]], object]]]:
     values: Mapping[str, tuple[object, ...]] = {
-        "count": (2**31, 10**6, -1, 0, "many", 1.5, None),
-        "byteOffset": (10**6, -4, "x"),
-        "bufferView": (99, -9, None, "x"),
-        "componentType": (1, None),
-        "type": ("MAT4", "none"),
+        "count": (2**31, -1, 0, "many", None),
+        "byteOffset": (10**6, -4),
+        "bufferView": (99, None),
     }
     for key, wrong in values.items():
         for value in wrong:
@@ -295,10 +230,6 @@ def _named_in_obj(name: str) -> bytes:
     return f"mtllib {name}\n".encode() + good("obj")
 
 
-def _named_last_in_obj(name: str) -> bytes:
-    return f"mtllib no.mtl\nmtllib {name}\n".encode() + good("obj")
-
-
 def _named_in_dae(name: str) -> bytes:
     image = f'<library_images><image id="i"><init_from>{name}</init_from></image></library_images>'
     return good("dae").replace(b"<library_geometries>", image.encode() + b"<library_geometries>")
@@ -317,7 +248,6 @@ def _named_in_ply(name: str) -> bytes:
 
 _NAMING: dict[str, Callable[[str], bytes]] = {
     "obj": _named_in_obj,
-    "Obj": _named_last_in_obj,
     "dae": _named_in_dae,
     "gltf": _named_in_gltf,
     "glb": lambda name: _changed_glb(lambda tree: tree.update(images=[{"uri": name}])),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from robots import RobotDescriptor
-from tests.faults.fault import GOES_ON, Fault
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
 from tests.robots.mjcf_parts import arm, mjcf
 
 AREA = "MJCFs"
@@ -16,10 +15,8 @@ GOOD = mjcf(arm())
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    for what, text in _TEXTS.items():
-        yield Fault(AREA, what, lambda folder, t=text: _read(folder, t))
-    for what, make in _FILES.items():
-        yield Fault(AREA, f"the file is {what}", lambda folder, m=make: _no_file(folder, m))
+    yield from each(AREA, "{}", _read, _TEXTS)
+    yield from each(AREA, "the file is {}", _no_file, _FILES)
     for number in ("nan", "inf", "1e400", "one"):
         for what, (old, new) in _NUMBERS.items():
             changed = GOOD.replace(old, new.format(number))
@@ -50,11 +47,7 @@ _TEXTS = {
     ),
 }
 _FILES: dict[str, Callable[[Path], object]] = {
-    "not there": lambda path: None,
-    "a folder": Path.mkdir,
-    "a FIFO": os.mkfifo,
-    "a link to /dev/zero": lambda path: path.symlink_to("/dev/zero"),
-    "5 GB of nothing": lambda path: (path.touch(), os.truncate(path, 5 << 30)),
+    **NO_FILES,
     "bytes that are no text": lambda path: path.write_bytes(bytes(range(256))),
 }
 _NUMBERS = {

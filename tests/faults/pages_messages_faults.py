@@ -9,6 +9,7 @@ from typing import Any
 
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.served_page import others_go_on, served, steer, still_served
+from tests.layouts.guests import Guest
 
 AREA = "pages"
 OTHER_KINDS = (  # which viser knows, and no page of ours needs
@@ -27,11 +28,9 @@ def faults() -> Iterator[Fault]:
     for what, run in {
         "a client asks for a share tunnel": _tunnel,
         "a client sends 10 MB": _large,
-        "a client never reads while another steers": _deaf,
         "a client vanishes without a word": _vanishes,
         "a client of another version of viser": _other_version,
         "a hundred strangers open connections and say nothing": _silent,
-        "a client more than there is room for": _crowd,
     }.items():
         yield Fault(AREA, what, run, GOES_ON)
 
@@ -39,13 +38,13 @@ def faults() -> Iterator[Fault]:
 def _messages(slider: str, box: str, choice: str) -> Iterator[tuple[str, Any]]:
     """Go through what no control sends, given the controls' uuids."""
     nan, infinite = float("nan"), float("inf")
-    for value in (nan, infinite, -infinite, 1e300, -5.0, 1 << 63, "0.5", "", None, True, [0.5], {}):
+    for value in (nan, infinite, 1e300, 1 << 63, "0.5", None, [0.5], {}):
         yield f"a slider to {value!r}", _update(slider, {"value": value})
     for value in (1, 0, "yes", None, 0.5, []):
         yield f"a box to {value!r}", _update(box, {"value": value})
-    for value in ("fast", "1e999 ×", "", None, 1, ["1 ×"], "__class__"):
+    for value in ("fast", "1e999 ×", None, 1, ["1 ×"]):
         yield f"a choice to {value!r}", _update(choice, {"value": value})
-    for name in ("update_cb", "sync_cb", "gui_api", "removed", "uuid", "props", "__class__", "x"):
+    for name in ("update_cb", "removed", "uuid", "__class__"):
         yield f"an update of {name!r}", _update(slider, {name: 0.5})
         yield f"an update of the value and {name!r}", _update(slider, {"value": 0.5, name: 0.5})
     for updates in (None, [], "value", 5, {}):
@@ -54,7 +53,7 @@ def _messages(slider: str, box: str, choice: str) -> Iterator[tuple[str, Any]]:
         yield f"an update of control {uuid!r}", _update(uuid, {"value": 0.5})
     yield "a field more", {**_update(slider, {"value": 0.5}), "excluded_self_client": 0}
     yield "a field less", {"type": "GuiUpdateMessage", "uuid": slider}
-    for kind in (None, "", 5, [], {}, "Message", "GuiUpdate", "guiupdatemessage", "__init__"):
+    for kind in (None, 5, [], "Message", "__init__"):
         yield f"a message of type {kind!r}", {"type": kind, "uuid": slider}
     for kind in OTHER_KINDS:
         yield f"a {kind}", {"type": kind, "uuid": slider, "name": "/arm", "source": "alert(1)"}
@@ -78,8 +77,6 @@ def _update(uuid: object, updates: object) -> dict[str, object]:
 
 def _message(number: int) -> str:
     """Send a wrong message, then a right one; nothing but the right one may have an effect."""
-    from tests.layouts.guests import Guest
-
     site = served()
     before = site.page._qpos["arm"].copy()
     with Guest(site.address) as sees, Guest(site.address) as means_harm:
@@ -103,8 +100,6 @@ def _message(number: int) -> str:
 
 
 def _tunnel(_: Path) -> str:
-    from tests.layouts.guests import Guest
-
     server, calls = served().server, []
     server.request_share_url = lambda *_: calls.append("a tunnel")
     try:
@@ -124,8 +119,6 @@ def _tunnel(_: Path) -> str:
 def _large(_: Path) -> str:
     from websockets.exceptions import ConnectionClosed
 
-    from tests.layouts.guests import Guest
-
     with Guest(served().address) as means_harm:
         try:
             means_harm.send(b"\0" * 10_000_000)
@@ -136,18 +129,7 @@ def _large(_: Path) -> str:
     raise AssertionError("the message is taken")
 
 
-def _deaf(_: Path) -> None:
-    from tests.layouts.guests import Guest
-
-    with Guest(served().address) as deaf:
-        deaf.enter()
-        for _ in range(20):
-            others_go_on()
-
-
 def _vanishes(_: Path) -> None:
-    from tests.layouts.guests import Guest
-
     for _ in range(5):
         client = Guest(served().address)
         client.enter()
@@ -176,23 +158,3 @@ def _silent(_: Path) -> None:
     others_go_on()
     for stranger in strangers:
         stranger.close()
-
-
-def _crowd(_: Path) -> str:
-    from websockets.exceptions import InvalidStatus
-
-    from layouts.viewer.guard import MOST_CLIENTS
-    from tests.layouts.guests import Guest
-    from tests.pages import wait_until
-
-    site, guests = served(), []
-    wait_until(lambda: not site.server.get_clients())
-    try:
-        for _ in range(MOST_CLIENTS + 8):  # some of others may not have gone yet
-            guests.append(Guest(site.address))
-    except InvalidStatus as error:
-        return (error.response.body or b"").decode()
-    finally:
-        for guest in guests:
-            guest.socket.close()
-    raise AssertionError(f"{len(guests)} clients are let in")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.served_page import served, still_served
+from tests.layouts.guests import WEBSOCKET, ask, talk
 
 AREA = "pages"
 EVIL = "evil.example"
@@ -13,23 +14,16 @@ OWN = "OWN"  # stands for the address and port at which the page is
 TOKEN = "TOKEN"
 
 HOSTS = (
-    EVIL, f"{EVIL}:PORT", "localhost", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example:PORT",
-    "127.0.0.1.evil.example:PORT", "127.0.0.2:PORT", "0.0.0.0:PORT", "[::1]:PORT",
-    "2130706433:PORT",
-    "evil.example@127.0.0.1:PORT", "127.0.0.1:PORT@evil.example", "127.0.0.1:PORT, evil.example",
-    "", ":PORT", "127.0.0.1:PORT:PORT", "http://127.0.0.1:PORT", "127.0.0.1:0PORT",
-    "loc\u00e4lhost",
+    EVIL, f"{EVIL}:PORT", "localhost", "127.0.0.1:1", "localhost.evil.example:PORT", "0.0.0.0:PORT",
+    "2130706433:PORT", "evil.example@127.0.0.1:PORT", "127.0.0.1:PORT, evil.example", "",
 )  # fmt: skip
 ORIGINS = (
-    f"http://{EVIL}", f"https://{EVIL}", "null", "", "http://127.0.0.1", "http://127.0.0.1:1",
-    "http://localhost:PORT", "https://127.0.0.1:PORT", "http://127.0.0.1:PORT.evil.example",
-    "http://127.0.0.1:PORT/", "file://", "chrome-extension://abc", "http://127.0.0.1:PORT evil",
+    f"http://{EVIL}", "null", "", "http://127.0.0.1:1", "http://localhost:PORT", "file://",
+    "http://127.0.0.1:PORT.evil.example", "http://127.0.0.1:PORT/",
 )  # fmt: skip
 QUERIES = (
-    "", "?", "?token", "?token=", "?token=x", "?Token=TOKEN", "?token=TOKENx", "?token=xTOKEN",
-    "?token=TOKEN&token=x", "?token=TOKEN&token=TOKEN", "?token=%00TOKEN", "?token=TOKEN%00",
-    "?x=TOKEN", "?token[]=TOKEN", "#token=TOKEN", "?token=\xff", "?token=%ff%fe",
-    "?token=" + "A" * 4000,
+    "", "?token", "?token=", "?token=x", "?Token=TOKEN", "?token=TOKENx", "?token=TOKEN&token=x",
+    "?token=%00TOKEN", "?token[]=TOKEN", "?token=%ff%fe", "?token=" + "A" * 4000,
 )  # fmt: skip
 PATHS = (
     "/index.html", "/../../../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/..%5c..%5cetc", "//",
@@ -39,13 +33,9 @@ PATHS = (
 RAW = {
     "zeros": b"\0" * 4000,
     "a request without version": b"GET /\r\n\r\n",
-    "a line without end": b"G" * 200_000,
     "a thousand headers": b"GET / HTTP/1.1\r\n" + b"A: b\r\n" * 1000 + b"\r\n",
-    "a header without end": b"GET / HTTP/1.1\r\nHost: " + b"a" * 200_000,
     "a TLS handshake": bytes.fromhex("16030100c8010000c40303") + b"\x11" * 200,
-    "HTTP/2": b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
     "nothing": b"",
-    "newlines": b"\r\n" * 100,
     "a header that begins another request": b"GET / HTTP/1.1\r\nHost: x\n\nGET /\r\n\r\n",
 }
 VERBS = ("POST", "HEAD", "PUT", "DELETE", "OPTIONS", "CONNECT", "TRACE", "get")
@@ -84,8 +74,6 @@ def _request(
 
 def _ask(kind: str, headers: dict[str, str], path: str, verb: str) -> str:
     """Send a request in which only one thing is wrong, and look that it is answered by nothing."""
-    from tests.layouts.guests import WEBSOCKET, ask
-
     site = served()
     own = f"127.0.0.1:{site.port}"
     pairs = {"Host": own} | ({"Origin": f"http://{own}", **WEBSOCKET} if kind != "page" else {})
@@ -102,8 +90,6 @@ def _ask(kind: str, headers: dict[str, str], path: str, verb: str) -> str:
 
 
 def _garbage(sent: bytes) -> str:
-    from tests.layouts.guests import talk
-
     status, answer = talk(served().port, sent, ends=True)
     assert status in (0, 400, 403), f"answered by {status}"
     assert b"Viser" not in answer

@@ -1,4 +1,4 @@
-"""Packages of other people that bring tasks, experts and presets that are none."""
+"""Packages of other people that bring tasks, experts, presets and robots that are none."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from unittest import mock
 
 from layouts.presets import PRESETS
 from robot_layouts.experts.registry import EXPERTS
+from robots.registry import ROBOTS
 from tasks.registry import TASKS
 from tests.faults.fault import GOES_ON, Fault
 
@@ -20,6 +21,7 @@ KINDS: dict[str, tuple[Mapping[str, Any], str, str]] = {  # catalogue, a name, o
     "tasks": (TASKS, "Acme-v1", "PickCube-v1"),
     "experts": (EXPERTS, "Acme-v1", "PickCube-v1"),
     "presets": (PRESETS, "acme", "ring"),
+    "robots": (ROBOTS, "acme", "panda"),
 }
 # What the module has, and what its entry point says; "{}" is the module.
 WRONG = {
@@ -38,6 +40,7 @@ WRONG_CLASSES = {
     "tasks": {"a function": "MADE = len", "a class": "MADE = dict"},
     "presets": {"a function of other arguments": "MADE = len", "a class": "MADE = dict"},
     "experts": {},
+    "robots": {"a function": "MADE = len", "a class": "MADE = dict"},
 }
 
 

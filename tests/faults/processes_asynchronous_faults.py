@@ -1,4 +1,4 @@
-"""A vector whose environments are sent actions and received: misused, stopped, killed meanwhile."""
+"""A vector whose environments are sent actions and received: stopped or killed meanwhile."""
 
 from __future__ import annotations
 
@@ -6,16 +6,13 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing
 from typing import Any
 
 import numpy as np
 
-from robots import RobotLayoutsError
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.worker_processes import (
     AREA,
-    TASK,
     actions,
     failure,
     later,
@@ -26,30 +23,15 @@ from tests.faults.worker_processes import (
 )
 
 ENVS = 4  # two for each worker
-_ARRAYS = {
-    "no environments": [],
-    "a mask": np.array([True, False, True, False]),
-    "halves": [0.5],
-    "one environment twice": [1, 1],
-    "an environment that there is not": [ENVS],
-}
 
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    for what, ids in _ARRAYS.items():
-        yield _fault(f"send() to {what}", lambda env, ids=ids: _send(env, ids, rows=1))
-    yield _fault("send() of more rows than environments", lambda env: _send(env, [0], rows=2))
-    for what, use in _MISUSES.items():
-        yield _fault(what, use)
     for what, use in _IN_THE_MIDDLE.items():
         yield _fault(f"{what} while another thread waits in recv()", _beside_recv(use))
     yield _fault("a worker is killed before recv()", _killed)
     yield _fault("a worker is stopped for longer than its time before recv()", _stopped)
     yield _fault("a worker is stopped for a while before recv()", _continued, GOES_ON)
-    yield _fault("reset() while environments are away", _reset_away, GOES_ON)
-    yield Fault(AREA, "step_wait() without step_async()", lambda _: _waits(0))
-    yield Fault(AREA, "step_wait() twice after step_async()", lambda _: _waits(1))
 
 
 def _fault(what: str, use: Callable[[Any], Any], promise: str | None = None) -> Fault:
@@ -61,36 +43,10 @@ def _fault(what: str, use: Callable[[Any], Any], promise: str | None = None) -> 
     return Fault(AREA, what, run, promise) if promise else Fault(AREA, what, run)
 
 
-def _send(env: Any, ids: Any, rows: int | None = None) -> None:
-    """Send as many rows as there are environments, or so many; if it is refused, none is away."""
-    try:
-        env.send(np.full((rows or len(ids), 8), 0.2, np.float32), ids)
-    except RobotLayoutsError:
-        _send(env, [0, 1, 2, 3])
-        raise
+def _send(env: Any, ids: list[int]) -> None:
+    env.send(np.full((len(ids), 8), 0.2, np.float32), ids)
 
 
-def _then(*uses: Callable[[Any], Any]) -> Callable[[Any], None]:
-    def run(env: Any) -> None:
-        for use in uses:
-            use(env)
-
-    return run
-
-
-_MISUSES: Mapping[str, Callable[[Any], Any]] = {
-    "recv() of what was not sent": lambda env: env.recv(),
-    "recv() of fewer than a batch": _then(lambda env: _send(env, [0]), lambda env: env.recv()),
-    "send() to an environment that is away": _then(
-        lambda env: _send(env, [0, 1]), lambda env: env.send(actions(env)[:2], [1, 2])
-    ),
-    "step() while an environment is away": _then(
-        lambda env: _send(env, [0]), lambda env: env.step(actions(env))
-    ),
-    "recv() after close()": _then(
-        lambda env: _send(env, [0, 1]), lambda env: env.close(), lambda env: env.recv()
-    ),
-}
 _IN_THE_MIDDLE: Mapping[str, Callable[[Any], Any]] = {
     "send()": lambda env: env.send(actions(env)[:1], [3]),
     "recv()": lambda env: env.recv(),
@@ -153,21 +109,3 @@ def _continued(env: Any) -> None:
             assert info["env_id"].tolist() == ids
             for result, wanted in zip(results, expected, strict=False):
                 np.testing.assert_array_equal(result, wanted[ids])
-
-
-def _reset_away(env: Any) -> None:
-    expected = env.step(actions(env))
-    _send(env, [0, 1, 2])
-    env.reset(seed=7)
-    for result, wanted in zip(env.step(actions(env))[:4], expected, strict=False):
-        np.testing.assert_array_equal(result, wanted)
-
-
-def _waits(rounds: int) -> None:
-    from tasks import sb3_vec_env
-
-    with closing(sb3_vec_env(TASK, 2, num_workers=0)) as env:
-        env.reset()
-        for _ in range(rounds):
-            env.step(np.full((2, 8), 0.2, np.float32))
-        env.step_wait()

@@ -14,7 +14,6 @@ from tests.faults.fault import GOES_ON, Fault
 from tests.faults.worker_processes import (
     AREA,
     PATIENCE,
-    TASK,
     USES,
     actions,
     living_workers,
@@ -23,22 +22,13 @@ from tests.faults.worker_processes import (
     vector,
 )
 
-
-def faults() -> Iterator[Fault]:
-    """Go through this area's faults."""
-    yield from _forks()
-
-
 ENDS = {
     "sys.exit": "sys.exit(0)",
     "an error": "raise ValueError('on purpose')",
-    "sys.exit, having closed the vector": "env.close(); one.close(); sys.exit(0)",
 }
 SUDDEN_ENDS: dict[str, Callable[[Any], Any]] = {
     "os._exit": lambda env: None,
-    "os._exit, having closed the vector": lambda env: env.close(),
     "os._exit, having let it be collected": lambda env: vars(env).clear(),
-    "SIGTERM": lambda env: os.kill(os.getpid(), signal.SIGTERM),
     "multiprocessing's own ending": lambda env: _end_of_multiprocessing(),
 }
 FORKING = """
@@ -60,7 +50,8 @@ if __name__ == "__main__":
 """
 
 
-def _forks() -> Iterator[Fault]:
+def faults() -> Iterator[Fault]:
+    """Go through this area's faults."""
     for name, use in USES.items():
         what = f"{name} of a vector with workers in a fork"
         yield Fault(AREA, what, lambda _, use=use: _used_in_fork(use))
@@ -73,10 +64,8 @@ def _forks() -> Iterator[Fault]:
         what = f"a fork ends by {name}, while a vector is open"
         yield Fault(AREA, what, lambda _, last=last: _fork_ends_suddenly(last), GOES_ON)
     yield Fault(AREA, "a vector of its own in a fork", lambda _: _own_in_fork(), GOES_ON)
-    yield Fault(AREA, "a task is stepped in a fork", lambda _: _stepped_in_fork(), GOES_ON)
     yield Fault(AREA, "a vector in a process by fork", lambda _: _in_process_by("fork"), GOES_ON)
     yield Fault(AREA, "a vector in a process by spawn", lambda _: _in_process_by("spawn"), GOES_ON)
-    yield Fault(AREA, "a vector in a multiprocessing.Pool", lambda _: _in_pool(), GOES_ON)
 
 
 def _used_in_fork(use: Callable[[Any], Any], workers: int = 2) -> None:
@@ -122,23 +111,6 @@ def _own_in_fork() -> None:
         assert _in_fork(play_own) == wanted
 
 
-def _stepped_in_fork() -> None:
-    import tasks
-
-    env = tasks.make(TASK)
-    env.reset(seed=5)
-    state = _in_fork(lambda: _three_steps(env))
-    assert state == _three_steps(env)
-    env.close()
-
-
-def _three_steps(env: Any) -> bytes:
-    import numpy as np
-
-    action = np.full((1, 8), 0.3, np.float32)
-    return b"".join(env.step(action)[0].numpy().tobytes() for _ in range(3))
-
-
 def _in_process_by(method: str) -> None:
     context: Any = multiprocessing.get_context(method)
     ours, theirs = context.Pipe()
@@ -152,11 +124,6 @@ def _in_process_by(method: str) -> None:
 
 def _send_own(connection: Any) -> None:
     connection.send(play_own())
-
-
-def _in_pool() -> None:
-    with multiprocessing.get_context("fork").Pool(1) as pool:
-        assert pool.apply(play_own) == play_own()
 
 
 def _in_fork(call: Callable[[], Any]) -> Any:

@@ -8,6 +8,7 @@ import signal
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,15 +27,7 @@ from tests.faults.worker_processes import (
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    yield from _parents_that_end()
-    yield from _main_modules()
-
-
-# -- parents that end -----------------------------------------------------------------------------
-
-
-def _parents_that_end() -> Iterator[Fault]:
-    for milliseconds in (0, 50, 100, 200, 400, 800, 1600, 3200):
+    for milliseconds in (0, 100, 400, 1600):
         what = f"a process is killed {milliseconds} ms after it began to start workers"
         yield Fault(AREA, what, lambda _, s=milliseconds / 1000: _parent_ends(s), GOES_ON)
     for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT"):
@@ -47,6 +40,8 @@ def _parents_that_end() -> Iterator[Fault]:
     yield Fault(AREA, what, lambda _: _parent_ends(None, task_id="BusySteps-v1"), GOES_ON)
     what = "a process is killed that plays episodes in workers"
     yield Fault(AREA, what, lambda _: _parent_ends(None, hold="plays"), GOES_ON)
+    for what, (text, hint) in MAINS.items():
+        yield Fault(AREA, f"a script {what}", partial(_run_main, text, hint))
 
 
 def _parent_ends(
@@ -151,12 +146,6 @@ MAINS = {
         "gymnasium.make_vec('RobotLayouts/PushCube-v1', num_envs=2, num_workers=2)\n",
         "could not import the main module",
     ),
-    "ends when a worker imports it": (
-        "import gymnasium, sys, tasks\n"
-        "if __name__ != '__main__': sys.exit(5)\n"
-        "gymnasium.make_vec('RobotLayouts/PushCube-v1', num_envs=2, num_workers=2)\n",
-        "could not import the main module",
-    ),
     "defines a task where only it is run": (
         "import gymnasium, tasks\n"
         "from tasks.maniskill.push_cube import PushCube\n"
@@ -166,28 +155,10 @@ MAINS = {
         "    gymnasium.make_vec('RobotLayouts/Mine-v1', num_envs=2, num_workers=2)\n",
         "define it in a module that they can import",
     ),
-    "defines a task in a function": (
-        "import gymnasium, tasks\n"
-        "from tasks.maniskill.push_cube import PushCube\n"
-        "def mine():\n"
-        "    class Mine(PushCube): pass\n"
-        "    return Mine\n"
-        "if __name__ == '__main__':\n"
-        "    tasks.register_task('Mine-v1')(mine())\n"
-        "    gymnasium.make_vec('RobotLayouts/Mine-v1', num_envs=2, num_workers=2)\n",
-        "defined in a module that they can import",
-    ),
 }
 
 
-def _main_modules() -> Iterator[Fault]:
-    for what, (text, hint) in MAINS.items():
-        yield Fault(
-            AREA, f"a script {what}", lambda folder, t=text, h=hint: _run_main(folder, t, h)
-        )
-
-
-def _run_main(folder: Path, text: str, hint: str) -> None:
+def _run_main(text: str, hint: str, folder: Path) -> None:
     from robots import RobotLayoutsError
 
     done = run_script(folder, text)

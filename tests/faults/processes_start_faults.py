@@ -18,7 +18,6 @@ from tests.faults.worker_processes import (
     living_workers,
     open_files,
     play_own,
-    run_script,
     server_pid,
     session_of,
     vector,
@@ -28,24 +27,15 @@ from tests.faults.worker_processes import (
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    yield from _too_little()
-    yield from _servers()
-
-
-# -- too little -----------------------------------------------------------------------------------
-
-
-def _too_little() -> Iterator[Fault]:
-    for more in (0, 1, 2, 3, 4, 6, 9, 13, 18, 24):
+    for more in (0, 2, 4, 9, 18):
         what = f"{more} more file descriptors for 8 workers"
         yield Fault(AREA, what, lambda _, more=more: _few_descriptors(more))
-    for limit in (16, 20, 24):
-        what = f"8 workers in a process with ulimit -n {limit}"
-        yield Fault(AREA, what, lambda folder, n=limit: _limited(folder, f"ulimit -n {n}"))
     yield Fault(AREA, "no memory to share", lambda _: _no_shared_memory())
-    for megabytes in (0, 1, 4, 16):
+    for megabytes in (0, 4):
         what = f"workers that may take {megabytes} MB more"
         yield Fault(AREA, what, lambda _, more=megabytes: _little_memory(more))
+    yield Fault(AREA, "the server is killed before a start", lambda _: _no_server(), GOES_ON)
+    yield Fault(AREA, "the server is killed with a vector open", lambda _: _server_lost())
 
 
 def _few_descriptors(more: int) -> None:
@@ -67,28 +57,6 @@ def _with_few_descriptors(more: int) -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
         assert children() == before
         assert open_files() == open_before
-
-
-LIMITED = """
-import os, sys, multiprocessing
-from robots import RobotLayoutsError
-from tasks.interfaces.vector import VectorTask
-if __name__ == "__main__":
-    try:
-        VectorTask("PushCube-v1", 8, num_workers=8)
-    except RobotLayoutsError as error:
-        assert not multiprocessing.active_children()
-        sys.exit(str(error))
-"""
-
-
-def _limited(folder: Path, limit: str) -> None:
-    from robots import RobotLayoutsError
-
-    done = run_script(folder, LIMITED, limit)
-    assert "Traceback" not in done.stderr, done.stderr[-2000:]
-    if done.returncode:
-        raise RobotLayoutsError(done.stderr.strip())
 
 
 def _no_shared_memory() -> None:
@@ -126,14 +94,6 @@ def _little_memory(megabytes: int) -> None:
         for _ in range(5):
             env.reset(options={"reconfigure": True})
             env.step(actions(env))
-
-
-# -- the server -----------------------------------------------------------------------------------
-
-
-def _servers() -> Iterator[Fault]:
-    yield Fault(AREA, "the server is killed before a start", lambda _: _no_server(), GOES_ON)
-    yield Fault(AREA, "the server is killed with a vector open", lambda _: _server_lost())
 
 
 def _no_server() -> None:

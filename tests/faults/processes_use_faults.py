@@ -11,7 +11,11 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any
 
-from robots import RobotLayoutsError
+import gymnasium
+
+import tasks
+from robots import RobotLayoutsError, SimulationError
+from tasks.interfaces.vector import VectorTask
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.worker_processes import (
     AREA,
@@ -29,21 +33,12 @@ from tests.faults.worker_processes import (
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    yield from _threads()
     yield from _copies()
-
-
-# -- threads --------------------------------------------------------------------------------------
-
-
-def _threads() -> Iterator[Fault]:
     for name, use in {**USES, "close()": lambda env: env.close()}.items():
         for workers in (0, 2):
             what = f"{name} while another thread steps a vector of {workers} workers"
             yield Fault(AREA, what, lambda _, use=use, workers=workers: _collide(use, workers))
     yield Fault(AREA, "four threads step one vector", lambda _: _four_threads(), GOES_ON)
-    yield Fault(AREA, "four threads take turns", lambda _: _take_turns(), GOES_ON)
-    yield Fault(AREA, "four threads make vectors", lambda _: _all_make(), GOES_ON)
     yield Fault(AREA, "Ctrl-C again and again", lambda _: _interrupted(), GOES_ON)
 
 
@@ -63,8 +58,6 @@ def _collide(use: Callable[[Any], Any], workers: int) -> None:
 
 
 def _four_threads() -> str:
-    from robots import SimulationError
-
     steps, refused = [0] * 4, [0] * 4
     with vector("SlowSteps-v1", num_workers=2) as env:
         env.reset(seed=1)
@@ -84,27 +77,6 @@ def _four_threads() -> str:
         assert len(living_workers(env)) == 2
         assert info["elapsed_steps"].tolist() == [0, 0]
     return f"{sum(steps)} steps taken, {sum(refused)} refused"
-
-
-def _take_turns() -> None:
-    lock = threading.Lock()
-    with vector(num_workers=2) as env:
-        env.reset(seed=1)
-
-        def play(_: int) -> None:
-            for _ in range(5):
-                with lock:
-                    env.step(actions(env))
-
-        _run_threads(play)
-        assert env.step(actions(env))[4]["elapsed_steps"].tolist() == [21, 21]
-
-
-def _all_make() -> None:
-    results: list[bytes] = []
-    _run_threads(lambda _: results.append(play_own()))
-    assert len(set(results)) == 1
-    assert len(results) == 4
 
 
 def _run_threads(target: Callable[[int], Any]) -> None:
@@ -151,30 +123,14 @@ COPIES: dict[str, Callable[[Any], Any]] = {
 }
 
 
-def _fronts() -> dict[str, Callable[[], Any]]:
-    import gymnasium
-
-    import tasks
-    from tasks.interfaces.vector import VectorTask
-
-    return {
-        "a vector with workers": lambda: VectorTask(TASK, 2, num_workers=2),
-        "a vector without workers": lambda: VectorTask(TASK, 2, num_workers=0),
-        "a Gymnasium environment": lambda: gymnasium.make(f"RobotLayouts/{TASK}"),
-        "a PettingZoo environment": lambda: tasks.parallel_env(TASK),
-        "a Stable-Baselines3 environment": lambda: tasks.sb3_vec_env(TASK, 2, num_workers=0),
-        "a task": lambda: tasks.make(TASK, num_envs=2),
-    }
-
-
-FRONTS = (
-    "a vector with workers",
-    "a vector without workers",
-    "a Gymnasium environment",
-    "a PettingZoo environment",
-    "a Stable-Baselines3 environment",
-    "a task",
-)
+FRONTS: dict[str, Callable[[], Any]] = {
+    "a vector with workers": lambda: VectorTask(TASK, 2, num_workers=2),
+    "a vector without workers": lambda: VectorTask(TASK, 2, num_workers=0),
+    "a Gymnasium environment": lambda: gymnasium.make(f"RobotLayouts/{TASK}"),
+    "a PettingZoo environment": lambda: tasks.parallel_env(TASK),
+    "a Stable-Baselines3 environment": lambda: tasks.sb3_vec_env(TASK, 2, num_workers=0),
+    "a task": lambda: tasks.make(TASK, num_envs=2),
+}
 
 
 def _copies() -> Iterator[Fault]:
@@ -185,12 +141,11 @@ def _copies() -> Iterator[Fault]:
             what = f"{name} of {front}"
             yield Fault(AREA, what, lambda _, f=front, c=make_copy: _copied(f, c), GOES_ON)
     yield Fault(AREA, "copy.deepcopy of a vector fails", lambda _: _copy_fails(), GOES_ON)
-    yield Fault(AREA, "pickle of a closed vector", lambda _: _copied_closed(), GOES_ON)
 
 
 def _copied(front: str, make_copy: Callable[[Any], Any]) -> None:
     """Copy, end the copy, and see that the original goes on and the copy was made alike."""
-    original = _fronts()[front]()
+    original = FRONTS[front]()
     _seed(original)
     other = make_copy(original)
     assert other is not original
@@ -227,11 +182,3 @@ def _copy_fails() -> None:
         finally:
             resource.setrlimit(resource.RLIMIT_NOFILE, room)
         assert env.step(actions(env))[0].tobytes() == played
-
-
-def _copied_closed() -> None:
-    with vector(num_workers=2) as env:
-        env.close()
-        other = pickle.loads(pickle.dumps(env))
-        other.reset()
-        other.close()

@@ -89,7 +89,7 @@ def _goes_on(task_id: str) -> str:
 
 
 SIGNALS = ("SIGKILL", "SIGTERM", "SIGSEGV", "SIGABRT", "SIGHUP", "SIGQUIT")
-MOMENTS = (0.0, 0.05, 0.15, 0.3, 0.6)  # s after a call has begun that takes 0.2 s or more
+MOMENTS = (0.0, 0.15, 0.6)  # s after a call has begun that takes 0.2 s or more
 
 
 def _workers_that_end() -> Iterator[Fault]:

@@ -16,7 +16,7 @@ from robots import RobotLayoutsError
 from tests.faults.fault import GOES_ON, Fault, run_command
 from tests.faults.players import recorded
 from tests.faults.toy_robots import BOX, descriptor, mesh, toy
-from tests.faults.worker_processes import PATIENCE, ROOT
+from tests.faults.worker_processes import ROOT
 
 AREA = "programs"
 SECONDS = 120.0
@@ -34,9 +34,7 @@ def faults() -> Iterator[Fault]:
         run = functools.partial(_in_a_fork, workers)
         yield Fault(AREA, f"a fork records with {workers} workers", run, GOES_ON)
     yield Fault(AREA, "threads record into one folder", _into_one_folder)
-    yield Fault(AREA, "threads evaluate", _evaluate, GOES_ON)
     yield Fault(AREA, "threads export to one file", _export, GOES_ON)
-    yield Fault(AREA, "a fork while another thread checks", _fork_beside, GOES_ON)
     what = f"{', '.join(HOMES)} may not be written"
     yield Fault(AREA, what, _recorded, GOES_ON)
     for words in (RECORD, EXPORT):
@@ -116,36 +114,10 @@ def _into_one_folder(folder: Path) -> None:
     raise errors[0]
 
 
-def _evaluate(_: Path) -> None:
-    from robot_layouts.data import evaluate
-
-    calls = [lambda w=w: evaluate("expert", "PushCube-v1", (0,), workers=w) for w in (0, 1)]
-    assert not _all(*calls)
-
-
 def _export(folder: Path) -> None:
     layout = _layout(folder)
     assert not _all(*[functools.partial(layout.to_mjcf, folder / "cell.xml")] * 4)
     assert {path.name for path in folder.iterdir()} == {"cell.xml", "cell_assets", "toy.urdf"}
-
-
-def _fork_beside(folder: Path) -> str:
-    layout, over = _layout(folder), threading.Event()
-
-    def check() -> None:
-        while not over.is_set():
-            layout.validate(samples=20, workspaces=False)
-
-    thread = threading.Thread(target=check)
-    thread.start()
-    try:
-        for _ in range(10):
-            _fork(lambda: layout.validate(samples=20, workspaces=False))
-    finally:
-        over.set()
-        thread.join(PATIENCE)
-    assert not thread.is_alive()
-    return "ten forks check as well"
 
 
 def _layout(folder: Path, shape: str = BOX) -> Layout:

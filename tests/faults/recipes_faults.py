@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import functools
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from robot_layouts.data.playing.command_options import Players
+from robot_layouts.data.recipe_commands import build_command, recipe_command
 from robots import RobotLayoutsError
-from tests.faults.fault import GOES_ON, Fault, run_command
+from tests.data.recordings import record
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
+from tests.faults.strangers import lay_bait, runs_nothing
 
 AREA = "recipes"
 TASK, POLICY = "PushT-v1", "tests.data.policies:still"
@@ -24,49 +27,30 @@ GOOD = _of(f"policy: '{POLICY}', {STEPS}")
 _FIELDS = {
     "no recordings": "made_with: {numpy: 1.0}",
     "recordings are a list": "recordings: [PushT-v1]",
-    "recordings are a number": "recordings: 5",
     "an unknown key": f"recording: {{}}\n{GOOD}",
     "made_with is a list": f"made_with: [numpy]\n{GOOD}",
     "a recording is a list": "recordings: {it: [PushT-v1]}",
-    "a recording is empty": "recordings: {it: }",
-    "a task is a list": _of("", task="[PushT-v1]"),
     "a task is nobody's": _of("", task="PushTee-v1"),
-    "policy is a mapping": _of("policy: {a: 1}"),
     "a policy that is not there": _of("policy: 'tests.data.policies:stil'"),
-    "layout is a number": _of("layout: 5"),
     "layout is somewhere else": _of("layout: ../layout.yaml"),
     "layout is /etc/passwd": _of("layout: /etc/passwd"),
-    "robots are a list": _of("robots: [panda]"),
     "a robot that is not there": _of("robots: pandy"),
     "a robot of no place": _of("robots: {left: panda_stick}"),
     "bystanders are a number": _of("bystanders: 7"),
     "control_mode is unknown": _of("control_mode: pd_ee_dance"),
-    "obs_mode is unknown": _of("obs_mode: smell"),
     "observations are a word": _of(f"observations: maybe, {STEPS}, policy: '{POLICY}'"),
-    "reward_mode is unknown": _of("reward_mode: praise"),
     "no steps": _of("max_episode_steps: 0"),
-    "half a step": _of("max_episode_steps: 1.5"),
-    "steps in words": _of("max_episode_steps: many"),
     "endless steps": _of("max_episode_steps: .inf"),
-    "randomization is a number": _of("randomization: 5"),
     "randomization of nothing there is": _of("randomization: {mas: 1}"),
-    "randomization that is no setting": _of("randomization: wild"),
-    "cameras are a number": _of("cameras: 7"),
-    "cameras are somewhere else": _of("cameras: ../cameras.yaml"),
     "a camera without a place": _of("cameras: [{name: a}]"),
     "sensor_configs is a list": _of("sensor_configs: [64]"),
     "camera_size is a word": _of("camera_size: big"),
-    "camera_size of three": _of("camera_size: [1, 2, 3]"),
-    "camera_size of nothing": _of("camera_size: [0, 0]"),
     "visuals is unknown": _of("visuals: pretty"),
     "file_size is negative": _of(f"file_size: -1, {STEPS}, policy: '{POLICY}'"),
-    "file_size is a word": _of(f"file_size: large, {STEPS}, policy: '{POLICY}'"),
     "exports are a list": _of("exports: [lerobot]"),
-    "an export without a format": _of("exports: {x: {}}"),
     "an export of an unknown format": _of("exports: {x: {format: csv}}"),
     "an export with an unknown option": _of("exports: {x: {format: lerobot, fsp: 1}}"),
     "an export whose flag is a word": _of("exports: {x: {format: robomimic, depth: 5}}"),
-    "an export of no frames a second": _of("exports: {x: {format: lerobot, fps: 0}}"),
     "an export in the recording's folder": _of("exports: {it: {format: lerobot}}"),
     "files are a list": _of("files: [trajectory.h5]"),
     "an unknown key of a recording": _of("sedes: 1"),
@@ -76,12 +60,9 @@ _NAMES = {
     f"the name of a recording is {what}": GOOD.replace("it:", f"{name}:")
     for what, name in {
         "a path up": "../it",
-        "a path": "/tmp/it",
         "hidden": ".it",
         "empty": "''",
         "of 101 letters": "x" * 101,
-        "two lines": '"a\\nb"',
-        "with a null character": '"a\\0"',
         "in Cyrillic letters": "Аrm",
     }.items()
 } | {
@@ -90,30 +71,25 @@ _NAMES = {
 }
 
 _SEEDS = {
-    f"seeds are {seeds}": _of(STEPS, seeds=seeds)
-    for seeds in ("-1", "0.5", "1e12", "[]", "''", "9-0", "0-4294967295", "[0-2, 1]", "{0: 1}")
+    f"seeds are {seeds}": _of(STEPS, seeds=seeds) for seeds in ("-1", "[]", "9-0", "[0-2, 1]")
 }
 
 _BOMBS = {
     "empty": "",
-    "a number": "5",
     "two recipes": f"{GOOD}\n---\n{GOOD}",
     "a key twice": f"{GOOD}\n{GOOD}",
     "half": GOOD[: len(GOOD) // 2],
     "not UTF-8": "\udcff",
     "a tag of Python's": "recordings: !!python/object/apply:os.system [touch ran]",
-    "100,000 brackets": "[" * 100_000,
     "billion laughs": "a0: &a0 [ha, ha]\n"
     + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 12)),
 }
 
 _GADGETS = {
-    "a task in a module": _of("", task="'strange:Task-v1'"),
     "a policy in a module": _of("policy: 'strange:policy'"),
     "a takeover in a module": _of("takeover: 'strange:policy'"),
     "a corrector in a module": _of("corrector: 'strange:policy'"),
     "a robot in a module": _of("robots: 'strange:ROBOT'"),
-    "a robot in a module, by place": _of("robots: {arm: 'strange:ROBOT'}"),
     "a robot of a template": _of("robots: {arm: arm.xacro}"),
     "a robot in a module, in a layout's file": _of("layout: cell.yaml"),
     "a robot in a module, in a preset": _of(
@@ -125,12 +101,9 @@ _GADGETS = {
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    for what, text in {**_FIELDS, **_NAMES, **_SEEDS, **_BOMBS}.items():
-        yield Fault(AREA, what, functools.partial(_build, text=text))
-    for what, text in _GADGETS.items():
-        yield Fault(AREA, what, functools.partial(_runs_nothing, text=text))
-    for what, make in _FILES.items():
-        yield Fault(AREA, f"the file is {what}", functools.partial(_build_of, make=make))
+    yield from each(AREA, "{}", _build, {**_FIELDS, **_NAMES, **_SEEDS, **_BOMBS})
+    yield from each(AREA, "{}", _runs_nothing, _GADGETS)
+    yield from each(AREA, "the file is {}", _build_of, NO_FILES)
     for what, run in _BUILDS.items():
         yield Fault(AREA, what, run)
     for what, run in _RECIPES_OF.items():
@@ -143,9 +116,6 @@ def faults() -> Iterator[Fault]:
 
 def _make(folder: Path, *words: str) -> int:
     """Build the folder's recipe here; returns the exit code of the command."""
-    from robot_layouts.data.playing.command_options import Players
-    from robot_layouts.data.recipe_commands import build_command
-
     only = {"only": words} if words else {}
     players = Players(workers=0)  # no module but ours is named, or the command is run
     return build_command(
@@ -168,31 +138,11 @@ def _build_of(folder: Path, make: Callable[[Path], object]) -> None:
     _make(folder)
 
 
-_FILES: dict[str, Callable[[Path], object]] = {
-    "missing": lambda path: None,
-    "a folder": Path.mkdir,
-    "a FIFO": os.mkfifo,
-    "/dev/zero": lambda path: path.symlink_to("/dev/zero"),
-    "a link to itself": lambda path: path.symlink_to(path),
-}
-
-
 def _runs_nothing(folder: Path, text: str) -> None:
-    """Build by the command, in a folder of another's; whatever of theirs runs leaves a file."""
-    mark = folder / "ran"
-    (folder / "strange.py").write_text(f"import pathlib\npathlib.Path({str(mark)!r}).touch()\n")
-    (folder / "browser").write_text(f"#!/bin/sh\ntouch '{mark}'\n")
-    (folder / "browser").chmod(0o700)
-    (folder / "arm.xacro").write_text("<robot name=\"${open('ran', 'w')}\"/>")
-    (folder / "cell.yaml").write_text("version: 1\nrobots: {arm: {robot: 'strange:ROBOT'}}")
+    """Build by the command, in a folder of a stranger's."""
+    lay_bait(folder)
     (folder / "recipe.yaml").write_text(text)
-    more = {"BROWSER": str(folder / "browser"), "PYTHONDONTWRITEBYTECODE": "1"}
-    before = sorted(folder.iterdir())
-    try:
-        words = ("data", "build", "recipe.yaml", "--out", "out", "--workers", "0")
-        run_command("robot_layouts", *words, cwd=folder, env={**os.environ, **more})
-    finally:
-        assert sorted(folder.iterdir()) == before, "something of it ran"
+    runs_nothing(folder, "data", "build", "recipe.yaml", "--out", "out", "--workers", "0")
 
 
 def _other_bytes(folder: Path) -> None:
@@ -271,8 +221,6 @@ _KEEP = "include_failures: true"
 
 
 def _recipe_of(folder: Path, make: Callable[[Path], object]) -> None:
-    from robot_layouts.data.recipe_commands import recipe_command
-
     make(folder / "recording")
     try:
         recipe_command(folder / "recording", out=folder / "recipe.yaml")
@@ -281,8 +229,6 @@ def _recipe_of(folder: Path, make: Callable[[Path], object]) -> None:
 
 
 def _recorded(path: Path, file: str = "", text: str = "") -> None:
-    from tests.data.recordings import record
-
     path.mkdir()
     record(path / "trajectory.h5", TASK, [2])
     if file:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +24,11 @@ def faults() -> Iterator[Fault]:
     """Go through them."""
     for array, shape in ARRAYS.items():
         for what, edit in _replacements():
-            yield Fault(
-                AREA,
-                f"h5: {array} is {what}",
-                lambda folder, a=array, s=shape, e=edit: _replace(folder, a, s, e),
-            )
+            run = partial(_replace, array, shape, edit)
+            yield Fault(AREA, f"h5: {array} is {what}", run)
 
 
-def _replace(folder: Path, array: str, shape: tuple[int, ...], edit: Edit) -> None:
+def _replace(array: str, shape: tuple[int, ...], edit: Edit, folder: Path) -> None:
     def replace(file: h5py.File, folder: Path) -> None:
         above, _, name = array.rpartition("/")
         group = file[f"traj_0/{above}"] if above else file["traj_0"]
@@ -59,26 +57,17 @@ def _replacements() -> Iterator[tuple[str, Edit]]:
         ),
     )
     yield "virtual", lambda g, n, s, f: _virtual(g, n, s, str(f / "secret"))
-    yield (
-        "virtual, of a FIFO",
-        lambda g, n, s, f: (
-            os.mkfifo(f / "fifo"),
-            _virtual(g, n, s, str(f / "fifo")),
-        ),
-    )
     for what, values in {
         "texts": np.array([b"abc"] * 3),
         "complex numbers": np.zeros(3, complex),
         "records": np.zeros(3, [("a", "f4")]),
-        "opaque": np.zeros(3, "V8"),
         "of other length": np.zeros((9, 7), "f4"),
         "empty": np.zeros((0, 7), "f4"),
         "a single number": np.float32(1),
-        "of four dimensions": np.zeros((3, 1, 1, 1), "f4"),
         "halves of long doubles": np.zeros((3, 7), np.longdouble),
     }.items():
         yield what, lambda g, n, s, f, v=values: g.create_dataset(n, data=v)
-    for number in (np.nan, np.inf, -np.inf):
+    for number in (np.nan, np.inf):
         yield (
             f"full of {number}",
             lambda g, n, s, f, v=number: g.create_dataset(n, data=np.full(s, v, "f4")),
@@ -87,7 +76,6 @@ def _replacements() -> Iterator[tuple[str, Edit]]:
         "texts of any length": h5py.string_dtype(),
         "lists of any length": h5py.vlen_dtype(np.float32),
         "references": h5py.ref_dtype,
-        "references to regions": h5py.regionref_dtype,
         "an enumeration": h5py.enum_dtype({"a": 1, "b": 2, "c": 3}),
     }.items():
         yield what, lambda g, n, s, f, k=kind: g.create_dataset(n, s, k)
@@ -97,17 +85,15 @@ def _replacements() -> Iterator[tuple[str, Edit]]:
     yield "declared, but not there", lambda g, n, s, f: g.create_dataset(n, s, "f4")
     yield "2^31 rows of gzipped zeros", lambda g, n, s, f: _bomb(g, n, s, 2**31)
     yield "10^12 rows", lambda g, n, s, f: _bomb(g, n, s, 10**12)
-    for filters in ({"compression": "lzf"}, {"compression": "szip"}, {"scaleoffset": 2}):
-        if "szip" not in filters.values():
-            yield (
-                f"packed with {filters}",
-                lambda g, n, s, f, how=filters: g.create_dataset(
-                    n, data=np.zeros(s, "f4"), chunks=s, **how
-                ),
-            )
+    for filters in ({"compression": "lzf"}, {"scaleoffset": 2}):
+        yield (
+            f"packed with {filters}",
+            lambda g, n, s, f, how=filters: g.create_dataset(
+                n, data=np.zeros(s, "f4"), chunks=s, **how
+            ),
+        )
     yield "packed by unknown code", lambda g, n, s, f: _unknown_filter(g, n, s)
     yield "a gzip bomb in a chunk", lambda g, n, s, f: _chunk(g, n, s, _zeros(10**8))
-    yield "a chunk that is too short", lambda g, n, s, f: _chunk(g, n, s, _zeros(4))
     yield "a chunk that is not gzip", lambda g, n, s, f: _chunk(g, n, s, b"not gzip")
     yield "a chunk that pretends not to be packed", lambda g, n, s, f: _chunk(g, n, s, b"1234", 1)
 

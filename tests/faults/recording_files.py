@@ -13,6 +13,11 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
+import tasks
+from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.recording.recorder import Recorder
+from tasks.episode import play
+
 if TYPE_CHECKING:
     from robot_layouts.data.reading.recording import Trajectory
     from robot_layouts.data.recording.recorder import Recorder
@@ -27,16 +32,12 @@ SECRET = b"root:x:0:0:the secret of another file:/root:/bin/sh\n" * 40
 @functools.cache
 def task() -> TaskEnv:
     """Return the task that was recorded."""
-    import tasks
-
     return tasks.make(TASK, obs_mode="none")
 
 
 @functools.cache
 def episodes() -> tuple[Any, ...]:
     """Return the episodes that were recorded."""
-    from tasks.episode import play
-
     rng = np.random.default_rng(0)
     return tuple(
         play(task(), seed, rng.uniform(-1, 1, (steps, ACTIONS)).astype(np.float32))
@@ -57,8 +58,6 @@ def contents() -> tuple[bytes, bytes]:
 
 def recorder(path: Path, **how: bool) -> Recorder:
     """Begin a recording, or go on with it."""
-    from robot_layouts.data.recording.recorder import Recorder
-
     return Recorder(path, task(), **how)
 
 
@@ -90,8 +89,6 @@ def edit_json(path: Path, edit: Callable[[dict[str, Any]], None]) -> None:
 
 def read(path: Path) -> list[Trajectory]:
     """Read all that a replay or an export would."""
-    from robot_layouts.data.reading.recording import Recording
-
     with Recording(path) as file:
         file.expect(TASK, ACTIONS)
         return list(file)

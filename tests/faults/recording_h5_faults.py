@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
-from tests.faults.fault import GOES_ON, Fault
+from tests.faults.fault import GOES_ON, NO_FILES, Fault, each
 from tests.faults.recording_files import (
     AREA,
     BODY,
@@ -26,34 +26,16 @@ from tests.faults.recording_files import (
 
 def faults() -> Iterator[Fault]:
     """Go through them."""
-    for what, edit in _GROUPS.items():
-        yield Fault(AREA, f"h5: {what}", lambda folder, e=edit: read_edited(folder, e))
+    yield from each(AREA, "h5: {}", read_edited, _GROUPS)
     for name in ("layout", "simulation"):
-        for what, value in _ATTRIBUTES.items():
-            yield Fault(
-                AREA,
-                f"h5: attribute {name} is {what}",
-                lambda folder, n=name, v=value: read_edited(
-                    folder, lambda file, _: _attribute(file, n, v)
-                ),
-            )
-    for what, layout in _LAYOUTS.items():
-        yield Fault(
-            AREA,
-            f"h5: attribute layout has {what}",
-            lambda folder, edit=layout: read_edited(folder, lambda file, _: _layout(file, edit)),
-        )
+        what = f"h5: attribute {name} is {{}}"
+        yield from each(AREA, what, partial(_read_attribute, name), _ATTRIBUTES)
+    yield from each(AREA, "h5: attribute layout has {}", _read_layout, _LAYOUTS)
     for name in ("episode", "checksum"):
-        for what, value in _ATTRIBUTES.items():
-            yield Fault(
-                AREA,
-                f"h5: attribute {name} of an episode is {what}",
-                lambda folder, n=name, v=value: _keep_checksum(folder, n, v),
-            )
-    for what, change in _FILES.items():
-        yield Fault(AREA, f"h5: the file is {what}", lambda folder, c=change: _file(folder, c))
-    for what, change in _HARMLESS.items():
-        yield Fault(AREA, f"h5: {what}", lambda folder, c=change: _harmless(folder, c), GOES_ON)
+        what = f"h5: attribute {name} of an episode is {{}}"
+        yield from each(AREA, what, partial(_keep_checksum, name), _ATTRIBUTES)
+    yield from each(AREA, "h5: the file is {}", _file, _FILES)
+    yield from each(AREA, "h5: {}", _harmless, _HARMLESS, GOES_ON)
 
 
 def _cycle(file: h5py.File, folder: Path) -> None:
@@ -94,13 +76,11 @@ def _instead(name: str, value: Any) -> Callable[[h5py.File, Path], None]:
 _GROUPS: dict[str, Callable[[h5py.File, Path], None]] = {
     "an episode is not there": _delete("traj_1"),
     "an episode is an array": _instead("traj_1", np.zeros((3, 7), "f4")),
-    "an episode is a datatype": _instead("traj_1", np.dtype("f4")),
     "an episode is a link to another file": lambda file, folder: (
         file.__delitem__("traj_1"),
         file.__setitem__("traj_1", h5py.ExternalLink(str(folder / "secret"), "/")),
     ),
     "an episode is a link to another episode": _instead("traj_1", h5py.SoftLink("/traj_0")),
-    "an episode is a link to the file": _instead("traj_1", h5py.SoftLink("/")),
     "an episode is another episode, too": lambda file, folder: (
         file.__delitem__("traj_1"),
         file.__setitem__("traj_1", file["traj_0"]),
@@ -109,8 +89,6 @@ _GROUPS: dict[str, Callable[[h5py.File, Path], None]] = {
     "states are 500 groups deep": _deep,
     "10,001 groups are where bodies are": _wide,
     "one large array has 20 names": _many_of_one,
-    "actions are by robot": _instead("traj_0/actions", {}),
-    "states are an array": _instead("traj_0/env_states", np.zeros((4, 3), "f4")),
     "states are not by kind": _instead("traj_0/env_states/actors", np.zeros((4, 3), "f4")),
     "states are by kind, name and more": lambda file, folder: file.__setitem__(
         "traj_0/env_states/actors/more/rows", np.zeros((4, 3), "f4")
@@ -128,18 +106,12 @@ _GROUPS["actions are by robot"] = lambda file, folder: (
 _ATTRIBUTES: dict[str, Any] = {
     "a number": 3,
     "an array of numbers": np.zeros(5),
-    "ten million numbers": "many",
-    "an array of texts": np.array(["{}", "{}"], h5py.string_dtype()),
     "not json": "{",
-    "empty": "",
     "the json of a number": "3",
-    "the json of a list": "[1, 2]",
-    "the json of a text": '"text"',
     "json with a key twice": '{"arm": 1, "arm": 2}',
     "json 100,000 deep": "[" * 100_000,
     "json with a number of 5,000 digits": "9" * 5000,
     "a reference": "reference",
-    "not UTF-8": np.bytes_(b"\xff\xfe{}"),
     "nothing at all": h5py.Empty("f4"),
 }
 
@@ -148,19 +120,23 @@ def _attribute(holder: Any, name: str, value: Any) -> None:
     holder.attrs.pop(name, None)
     if isinstance(value, str) and value == "reference":
         holder.attrs.create(name, holder.file["traj_0"].ref, dtype=h5py.ref_dtype)
-    elif isinstance(value, str) and value == "many":
-        file = h5py.File(holder.file.filename, "r+", libver="latest")
-        holder = file[holder.name]
-        holder.attrs[name] = np.zeros(10**7)
     else:
         holder.attrs[name] = value
 
 
-def _keep_checksum(folder: Path, name: str, value: Any) -> None:
+def _read_attribute(name: str, folder: Path, value: Any) -> None:
+    read_edited(folder, lambda file, _: _attribute(file, name, value))
+
+
+def _keep_checksum(name: str, folder: Path, value: Any) -> None:
     path = recording(folder)
     with h5py.File(path, "r+") as file:
         _attribute(file["traj_0"], name, value)
     read(path)
+
+
+def _read_layout(folder: Path, edit: Callable[[dict[str, Any]], None]) -> None:
+    read_edited(folder, lambda file, _: _layout(file, edit))
 
 
 def _layout(file: h5py.File, edit: Callable[[dict[str, Any]], None]) -> None:
@@ -181,13 +157,10 @@ def _robot(name: str, value: Any) -> Callable[[dict[str, Any]], None]:
 
 _LAYOUTS: dict[str, Callable[[dict[str, Any]], None]] = {
     "a robot that is a list": lambda described: described.update(arm=[1, 2]),
-    "a robot that is a text": lambda described: described.update(arm="panda"),
-    "a robot that is null": lambda described: described.update(arm=None),
     **{
         f"{name} = {value!r:.40}": _robot(name, value)
         for name, values in {
-            "action": [None, "ab", ["a", "b", "c", "d"], [0], [0, "7"], [0, 7.5], [-1, 6], [7, 0]]
-            + [[1, 8], [0, 10**30], [True, 7], {"a": 1}],
+            "action": [None, "ab", [0], [0, "7"], [-1, 6], [7, 0], [0, 10**30], {"a": 1}],
             "position": [None, "far", [0, 0], [0, 0, "x"], [0, 0, float("nan")], [0, 0, 10**400]],
             "quaternion": [None, 1, [1, 0, 0], [1, 0, 0, None], [float("inf"), 0, 0, 0]],
             "robot": [None, 5, "", "x" * 500, ["panda"]],
@@ -229,22 +202,14 @@ def _endless_texts(content: bytes) -> bytes:
 
 
 _FILES: dict[str, Callable[[Path], None]] = {
-    "missing": lambda path: path.unlink(),
-    "a directory": _put(lambda path: path.mkdir()),
-    "a FIFO": _put(os.mkfifo),
-    "/dev/zero": _put(lambda path: path.symlink_to("/dev/zero")),
-    "a link to itself": _put(lambda path: path.symlink_to(path)),
+    **{what: _put(make) for what, make in NO_FILES.items()},
     "empty": _write(lambda content: b""),
     "a text": _write(lambda content: b"not even h5"),
-    "zeros": _write(lambda content: bytes(len(content))),
-    "a zip": _write(lambda content: b"PK\x03\x04" + content[4:]),
-    "only a signature": _write(lambda content: content[:8]),
     **{
         f"cut to {share:.1%}": _write(lambda content, s=share: content[: int(s * len(content))])
         for share in (0.01, 0.1, 0.3, 0.5, 0.9, 0.999)
     },
     "behind a script": _write(lambda content: b"#!/bin/sh\n".ljust(512) + content),
-    "cut at its front": _write(lambda content: content[1:]),
     "the numbers of another": _write(lambda content: content[:2000] + content[2008:] + bytes(8)),
     "of texts without end": _write(_endless_texts),
 }
@@ -275,12 +240,9 @@ def _bystander(path: Path) -> None:
 
 
 _HARMLESS: dict[str, Callable[[Path], None]] = {
-    "arrays are packed by gzip": _repack(compression="gzip"),
     "arrays are packed by shuffle and gzip, with checksums": _repack(
         compression="gzip", shuffle=True, fletcher32=True
     ),
-    "arrays are in chunks": _repack(chunks=True),
-    "arrays may grow": _repack(maxshape=None, chunks=True),
     "there are links that nothing reads": _bystander,
     "the h5 file has no checksums, as those of earlier versions": _repack(),
 }

@@ -11,39 +11,22 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from tests.faults.fault import GOES_ON, Fault
-from tests.faults.recording_files import (
-    AREA,
-    SECRET,
-    contents,
-    episodes,
-    go_on,
-    recorder,
-)
+import tasks
+from robot_layouts.data.recording.recorder import Recorder
+from tests.faults.fault import GOES_ON, Fault, each
+from tests.faults.recording_files import AREA, SECRET, episodes, go_on, recorder
 
 FIRST, SECOND = "seed-0000000010.part", "seed-0000000011.part"
 
 
 def faults() -> Iterator[Fault]:
     """Go through them."""
-    for what, put in _FOREIGN.items():
-        yield Fault(AREA, f"parts: {what}", lambda folder, p=put: _foreign(folder, p))
-    for what, damage in _DAMAGES.items():
-        yield Fault(
-            AREA, f"parts: a part is {what}", lambda folder, d=damage: _damaged(folder, d), GOES_ON
-        )
-    for what, edit in _CRAFTED.items():
-        yield Fault(
-            AREA,
-            f"parts: a part with a right checksum has {what}",
-            lambda folder, e=edit: _crafted(folder, e),
-            GOES_ON,
-        )
-    yield Fault(AREA, "parts: two parts have each other's name", _swapped, GOES_ON)
+    yield from each(AREA, "parts: {}", _foreign, _FOREIGN)
+    yield from each(AREA, "parts: a part is {}", _damaged, _DAMAGES, GOES_ON)
+    yield from each(AREA, "parts: a part with a right checksum has {}", _crafted, _CRAFTED, GOES_ON)
     yield Fault(AREA, "parts: a part has the name of another seed", _renamed, GOES_ON)
     yield Fault(AREA, "parts: a part of another task", _other_task)
-    for what, put in _PLACES.items():
-        yield Fault(AREA, f"recording: {what}", lambda folder, p=put: _place(folder, p))
+    yield from each(AREA, "recording: {}", _place, _PLACES)
 
 
 def _stopped(folder: Path) -> Path:
@@ -97,24 +80,15 @@ _FOREIGN: dict[str, Callable[[Path], Any]] = {
     "a part is a FIFO": _fifo(SECOND),
     "a part is a directory": _folder(SECOND),
     "a part is a link to another file": _link(SECOND, "/etc/passwd"),
-    "a part is a link to another part": _link(SECOND, FIRST),
     "a part is a link to itself": _link(SECOND, SECOND),
     "a part is a link to /dev/zero": _link(SECOND, "/dev/zero"),
     "a FIFO lies there": _fifo("something"),
-    "a directory lies there": _folder("something"),
     "a directory as if half written": _folder("seed-0000000013.part.7.partial"),
-    "a FIFO as if half written": _fifo("seed-0000000013.part.7.partial"),
     "somebody's notes lie there": _file("notes.txt"),
     "a seed of letters": _file("seed-0000000xyz.part"),
-    "no seed": _file("seed-.part"),
-    "a negative seed": _file("seed--000000001.part"),
-    "a seed of too few digits": _file("seed-12.part"),
     "a seed of too many digits": _file("seed-00000000012.part"),
-    "a seed beyond all": _file("seed-99999999999.part"),
     "a seed of Arabic digits": _file(f"seed-{chr(0x661) * 10}.part"),
-    "a seed with a sign": _file("seed-+000000012.part"),
     "a copy of a part": _file("seed-0000000010.part~"),
-    "a part in capitals": _file("SEED-0000000010.PART"),
     "a part of an earlier version": _file("seed-0000000009.h5"),
 }
 
@@ -136,14 +110,9 @@ def _flipped(place: float) -> Callable[[bytes], bytes]:
 
 _DAMAGES: dict[str, Callable[[bytes], bytes]] = {
     "empty": lambda content: b"",
-    "one byte": lambda content: content[:1],
-    "zeros": lambda content: bytes(len(content)),
     "a text": lambda content: SECRET,
-    "an h5 file": lambda content: contents()[0],
     "cut in half": lambda content: content[: len(content) // 2],
-    "short of a byte": lambda content: content[:-1],
     "followed by a byte": lambda content: content + b"\0",
-    "twice itself": lambda content: content * 2,
     "of another version": lambda content: content.replace(b"episode 1", b"episode 2", 1),
     **{f"changed in a bit at {place:.0%}": _flipped(place) for place in (0, 0.1, 0.3, 0.5, 0.9, 1)},
 }
@@ -185,45 +154,32 @@ def _array(index: int, value: Any) -> Callable[[list[Any], bytes], list[Any]]:
 
 _CRAFTED: dict[str, Callable[[list[Any], bytes], list[Any]]] = {
     "a header that is not json": lambda lines, numbers: [b"{", lines[1]],
-    "a header that is a list": lambda lines, numbers: [[1], lines[1]],
     "a header 100,000 deep": lambda lines, numbers: [b"[" * 100_000, lines[1]],
     "no json of its arrays": lambda lines, numbers: [lines[0], b"nothing"],
-    "a list for its arrays' json": lambda lines, numbers: [lines[0], []],
     "bytes that are no text": lambda lines, numbers: [lines[0], b"\xff\xfe"],
     "no arrays": _about(arrays=[]),
     "arrays that are a number": _about(arrays=3),
-    "arrays that are texts": _about(arrays=["a", "b"]),
     "arrays of two words": _about(arrays=[["actions", "<f4"]]),
-    "attributes that are a list": _about(attributes=[]),
     "attributes without an episode": _about(attributes={}),
-    "an attribute that is a number": _about(attributes={"episode": 3}),
     "an episode that is not json": _about(attributes={"episode": "{"}),
-    **{f"an array called {name!r}": _array(0, name) for name in ("../x", "/x", ".", "", "a\0b", 3)},
-    **{f"an array of kind {kind!r}": _array(1, kind) for kind in ("O", "<U9", "|V8", "x", None)},
+    **{f"an array called {name!r}": _array(0, name) for name in ("../x", "", "a\0b", 3)},
+    **{f"an array of kind {kind!r}": _array(1, kind) for kind in ("O", "<U9", None)},
     **{
         f"an array of shape {shape!r}": _array(2, shape)
-        for shape in ([-1, 7], [2**40, 7], ["4", 7], [4.0, 7], 28, [4, 7] * 40, [10**30], None)
+        for shape in ([-1, 7], [2**40, 7], ["4", 7], 28, [4, 7] * 40)
     },
     "numbers too few": lambda lines, numbers: [*lines, numbers[:-4]],
     "numbers too many": lambda lines, numbers: [*lines, numbers + bytes(4)],
     **{
         f"an episode with {name} = {value!r}": _episode(**{name: value})
         for name, value in (
-            *(("episode_seed", value) for value in (12, -1, "11", None, 11.0, [11], True)),
+            *(("episode_seed", value) for value in (12, -1, "11", None)),
             *(("elapsed_steps", value) for value in (5, 0, "4", None)),
             *(("reset_kwargs", value) for value in ("x", [1])),
             ("control_mode", 3),
         )
     },
 }
-
-
-def _swapped(folder: Path) -> str:
-    path = _stopped(folder)
-    parts = path.with_suffix(".parts")
-    (parts / FIRST).write_bytes(_parts()[SECOND])
-    (parts / SECOND).write_bytes(_parts()[FIRST])
-    return go_on(path)
 
 
 def _renamed(folder: Path) -> str:
@@ -234,9 +190,6 @@ def _renamed(folder: Path) -> str:
 
 
 def _other_task(folder: Path) -> None:
-    import tasks
-    from robot_layouts.data.recording.recorder import Recorder
-
     path = _stopped(folder)
     Recorder(path, tasks.make("PullCube-v1"), resume=True)
 

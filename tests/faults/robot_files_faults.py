@@ -20,7 +20,7 @@ from tests.faults.toy_robots import (
 
 AREA = "robot files"
 
-NOT_NUMBERS = ("", "wide", "nan", "inf", "-inf", "1e300", "1e999", "0x10", "1_0", "1,5", "١")
+NOT_NUMBERS = ("", "wide", "nan", "inf", "1e300", "0x10", "1,5")
 ENTITY = '<!DOCTYPE robot [<!ENTITY a "0.1 0.1 0.1">]>'
 BOMB = "<!DOCTYPE robot [" + '<!ENTITY e0 "ha">' + "".join(
     f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 10)
@@ -58,7 +58,7 @@ def _wrong_texts() -> Iterator[tuple[str, str]]:
         yield f"collision {what}", toy(shape)
     for what, shape in _SHAPES.items():
         yield f"visual {what}", toy(more=f"<visual><geometry>{shape}</geometry></visual>")
-    for count in (256, 300, 1000, 3000, 10000):
+    for count in (256, 1000, 10000):
         yield f"a chain of {count} links", _chain(count, "revolute")
         yield f"a chain of {count} fixed links", _chain(count, "fixed")
     for count in (256, 10000):
@@ -72,14 +72,11 @@ def _wrong_texts() -> Iterator[tuple[str, str]]:
 # Numbers of the toy, by what they are.
 _NUMBERS = {
     "joint origin xyz": 'xyz="0 0 0.3"',
-    "collision origin xyz": 'xyz="0 0 0.1"',
     "origin rpy": 'rpy="0 0 0"',
     "axis": 'xyz="0 1 0"',
     "mass": 'value="1"',
     "inertia ixx": 'ixx="0.1"',
-    "inertia ixy": 'ixy="0"',
     "limit lower": 'lower="-1"',
-    "limit upper": 'upper="1"',
     "limit effort": 'effort="10"',
     "limit velocity": 'velocity="1"',
     "box size": 'size="0.1 0.1 0.1"',
@@ -88,46 +85,29 @@ _NUMBERS = {
 _CHANGES = (
     ("axis of length 0", 'xyz="0 1 0"', 'xyz="0 0 0"'),
     ("lower above upper", 'lower="-1"', 'lower="2"'),
-    ("lower equal to upper", 'lower="-1"', 'lower="1"'),
     ("no limit", LIMIT, ""),
     ("effort below 0", 'effort="10"', 'effort="-1"'),
-    ("velocity below 0", 'velocity="1"', 'velocity="-1"'),
     ("mass 0", 'value="1"', 'value="0"'),
-    ("mass below 0", 'value="1"', 'value="-1"'),
-    ("mass 1e-300", 'value="1"', 'value="1e-300"'),
     ("moment below 0", 'ixx="0.1"', 'ixx="-0.1"'),
-    ("moment 1e-300", 'ixx="0.1"', 'ixx="1e-300"'),
     ("products of inertia that no body has", 'ixy="0"', 'ixy="5"'),
-    ("no mass", '<mass value="1"/>', ""),
     ("no inertia", '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>', ""),
-    ("no ixy", ' ixy="0"', ""),
     ("an empty inertial", INERTIAL, "<inertial/>"),
     ("no parent", '<parent link="base"/>', ""),
-    ("no child", '<child link="arm"/>', ""),
     ("an unknown parent", '<parent link="base"/>', '<parent link="bse"/>'),
-    ("an unknown child", '<child link="hand"/>', '<child link="hnad"/>'),
     ("a joint on itself", '<parent link="base"/>', '<parent link="arm"/>'),
-    ("a joint without a name", 'joint name="wrist"', "joint"),
     ("a joint without a type", 'type="revolute"', ""),
     ("a joint of unknown type", 'type="revolute"', 'type="hinge"'),
     ("a floating joint", 'type="revolute"', 'type="floating"'),
-    ("a planar joint", 'type="revolute"', 'type="planar"'),
     ("two joints of one name", 'joint name="wrist"', 'joint name="shoulder"'),
     ("two links of one name", 'link name="hand"', 'link name="arm"'),
-    ("a link without a name", 'link name="hand"', "link"),
     ("a link with an empty name", 'link name="hand"', 'link name=""'),
     ("a newline in a link's name", 'link name="hand"', 'link name="ha&#10;nd"'),
-    ("a tab in a joint's name", 'joint name="wrist"', 'joint name="wr&#9;ist"'),
     ("a name that is read backwards", 'link name="hand"', 'link name="ha&#x202e;nd"'),
     ("a name of 100,000 letters", 'link name="hand"', f'link name="{"h" * 100_000}"'),
-    ("mimic of nothing", LIMIT, f"{LIMIT}<mimic/>"),
     ("mimic of an unknown joint", LIMIT, f'{LIMIT}<mimic joint="elbow"/>'),
     ("mimic of itself", LIMIT, f'{LIMIT}<mimic joint="wrist"/>'),
     ("mimic with multiplier 0", LIMIT, f'{LIMIT}<mimic joint="shoulder" multiplier="0"/>'),
-    ("mimic with multiplier nan", LIMIT, f'{LIMIT}<mimic joint="shoulder" multiplier="nan"/>'),
-    ("mimic with offset 1e300", LIMIT, f'{LIMIT}<mimic joint="shoulder" offset="1e300"/>'),
     ("damping that is no number", LIMIT, f'{LIMIT}<dynamics damping="much"/>'),
-    ("friction nan", LIMIT, f'{LIMIT}<dynamics damping="0" friction="nan"/>'),
 )
 
 # Shapes that nobody can make sense of.
@@ -135,22 +115,15 @@ _SHAPES = {
     "without a shape": "",
     "of unknown shape": '<cone radius="1" length="1"/>',
     "box without size": "<box/>",
-    "sphere without radius": "<sphere/>",
-    "cylinder without radius": '<cylinder length="1"/>',
     "cylinder without length": '<cylinder radius="1"/>',
-    "capsule without length": '<capsule radius="1"/>',
     "box of size nan": '<box size="nan 1 1"/>',
-    "box of size 1e30": '<box size="1e30 1 1"/>',
     "box of size below 0": '<box size="-1 1 1"/>',
-    "sphere of radius 1e300": '<sphere radius="1e300"/>',
-    "sphere of radius below 0": '<sphere radius="-0.1"/>',
     "cylinder of length inf": '<cylinder radius="0.1" length="inf"/>',
     "mesh without a file": "<mesh/>",
     "mesh of an empty name": mesh(""),
     "mesh with scale 0": mesh("no.stl", ' scale="1 1 0"'),
     "mesh with scale nan": mesh("no.stl", ' scale="nan 1 1"'),
     "mesh with one scale": mesh("no.stl", ' scale="0.001"'),
-    "mesh with scale 1e300": mesh("no.stl", ' scale="1e300 1 1"'),
 }
 
 # Meshes that only those miss who use them.
@@ -163,22 +136,16 @@ _MISSING = {
 # Shapes that can be drawn, but that nothing can touch.
 _FLAT = {
     "box of size 0": '<box size="0 0 0"/>',
-    "box that is flat": '<box size="0.1 0.1 0"/>',
     "box of 1e-9 m": '<box size="1e-9 1e-9 1e-9"/>',
-    "sphere of radius 0": '<sphere radius="0"/>',
     "cylinder of length 0": '<cylinder radius="0.1" length="0"/>',
-    "capsule of radius 0": '<capsule radius="0" length="0.1"/>',
 }
 
 # What has a clear meaning all the same.
 _REPAIRED = {
     "mass 0",
     "moment below 0",
-    "moment 1e-300",
     "products of inertia that no body has",
-    "no mass",
     "no inertia",
-    "no ixy",
     "an empty inertial",
     "visual mesh with one scale",
     "xacro",
@@ -200,22 +167,16 @@ _TREES = {
     "no root": robot(
         link("a"), link("b"), joint("shoulder", "a", "b"), joint("wrist", "b", "a")
     ),
-    "a circle beside the root": robot(
-        link("base"), link("a"), link("b"), joint("shoulder", "a", "b"), joint("wrist", "b", "a")
-    ),
     "two roots": toy().replace("</robot>", f"{link('stray')}</robot>"),
     "two joints on one link": toy().replace("</robot>", joint("x", "base", "hand") + "</robot>"),
     "an SDF": '<sdf version="1.7"><model name="m"><link name="l"/></model></sdf>',
-    "an MJCF": '<mujoco model="m"><worldbody/></mujoco>',
     "xacro": toy().replace(
         "</robot>", '<x:macro xmlns:x="http://www.ros.org/wiki/xacro" name="m"/></robot>'
     ),
     "an entity": ENTITY + toy().replace("0.1 0.1 0.1", "&a;"),
     "an entity from a file": '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]>' + toy(),
     "an entity from the network": '<!DOCTYPE robot SYSTEM "http://127.0.0.1:9/x.dtd">' + toy(),
-    "a parameter entity": '<!DOCTYPE robot [<!ENTITY % a SYSTEM "/etc/passwd"> %a;]>' + toy(),
     "billion laughs": f"{BOMB}]>" + toy().replace("toy", "&e9;"),
-    "a document type in small letters": '<!doctype robot [<!entity a "b">]>' + toy(),
     "100,000 elements in one another": "<robot>" + "<a>" * 100_000 + "</a>" * 100_000 + "</robot>",
 }  # fmt: skip
 
@@ -241,24 +202,17 @@ def _wrong_bytes() -> Iterator[tuple[str, bytes]]:
     good = toy().encode()
     header = '<?xml version="1.0" encoding="{}"?>'
     declared = header + ENTITY + toy().replace("0.1 0.1 0.1", "&a;")
-    for encoding in ("utf-16", "utf-16-le", "utf-16-be", "utf-8-sig", "latin-1", "cp1252"):
+    for encoding in ("utf-16", "utf-8-sig", "latin-1"):
         yield f"an entity in {encoding}", declared.format(encoding).encode(encoding)
     yield "an entity in EBCDIC", declared.format("cp037").encode("cp037")
-    yield "an entity in UTF-32", declared.format("utf-32").encode("utf-32")
     yield "an entity in UTF-7", declared.format("utf-7").encode("utf-7")
-    yield (
-        "an unknown encoding",
-        header.format("x").encode() + good,
-    )
-    yield "an encoding of several bytes", header.format("shift_jis").encode() + good
+    yield "an unknown encoding", header.format("x").encode() + good
     yield "bytes that are not UTF-8", good.replace(b"toy", b"\xff\xfe\xfd")
     yield "empty", b""
-    yield "spaces", b" " * 1000
     yield "zeros", bytes(1000)
     yield "random bytes", bytes(range(256)) * 20
-    yield "a picture", b"\x89PNG\r\n\x1a\n" + bytes(100)
     yield "a control character", good.replace(b"toy", b"to\x01y")
-    for share in (1, 5, 9):
+    for share in (1, 9):
         yield f"the first {share * 10} %", good[: len(good) * share // 10]
 
 
@@ -267,19 +221,11 @@ def _wrong_srdfs() -> Iterator[tuple[str, bytes]]:
     utf16 = '<?xml version="1.0" encoding="utf-16"?>'
     yield "billion laughs", f"{BOMB}]>{good.replace('toy', '&e9;')}".encode()
     yield "an entity", (ENTITY + good).encode()
-    yield (
-        "an entity in UTF-16",
-        (utf16 + ENTITY + good).encode("utf-16"),
-    )
+    yield "an entity in UTF-16", (utf16 + ENTITY + good).encode("utf-16")
     yield "bytes that are not UTF-8", good.replace("toy", "\xff").encode("latin-1")
     yield "empty", b""
-    yield "no XML", b"left out: base, hand"
     yield "another file", b"<launch/>"
     yield "half", good.encode()[: len(good) // 2]
-    yield (
-        "a pair of one link",
-        robot('<disable_collisions link1="base" reason="Default"/>').encode(),
-    )
     yield "a pair of no link", robot('<disable_collisions reason="Default"/>').encode()
     yield "100,000 elements in one another", b"<robot>" + b"<a>" * 100_000
 

@@ -1,35 +1,31 @@
-"""Suites of somebody else, and runs that are stopped, damaged or played twice at once."""
+"""Suites of somebody else, and runs that are damaged."""
 
 from __future__ import annotations
 
 import functools
 import os
-import signal
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.faults.fault import GOES_ON, Fault, run_command
+from robot_layouts.data.suite.run import run_suite, verify_run
+from robot_layouts.data.suite.suite import load_suite
+from robots import RobotLayoutsError
+from tests.faults.fault import GOES_ON, Fault, each, run_command
+from tests.faults.strangers import lay_bait, runs_nothing
 
 AREA = "suites"
 TASK, POLICY = "PushT-v1", "tests.data.policies:LEANS"
 HEAD = "name: x\nseeds: 0\ntasks:\n"
 SUITE = f"{HEAD}  - {{task: {TASK}, name: First}}\n  - {{task: {TASK}, name: Later, seeds: 1-2}}\n"
-LONG = (
-    f"{HEAD}  - {{task: {TASK}, name: First}}\n  - {{task: {TASK}, name: Later, seeds: 0-9999}}\n"
-)
-ARM = "arm: {robot: panda_stick}"
 
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    for what, text in {**_FIELDS, **_NAMES, **_SEEDS, **_BOMBS}.items():
-        yield Fault(AREA, what, functools.partial(_load, text=text))
+    yield from each(AREA, "{}", _load, {**_FIELDS, **_NAMES, **_SEEDS, **_BOMBS})
     for what, value in _ELSEWHERE.items():
         for key in ("layout", "randomization"):
             run = functools.partial(_reads_nothing, key=key, value=value)
@@ -40,24 +36,16 @@ def faults() -> Iterator[Fault]:
     for words in (("report", "."), ("verify", ".", "--workers=0")):
         run = functools.partial(_runs_nothing, words=words, text=_GADGETS["a task in a module"])
         yield Fault(AREA, f"{words[0]}: a task in a module", run)
-    for what, edit in _DAMAGE.items():
-        yield Fault(AREA, f"goes on: {what}", functools.partial(_goes_on, edit=edit))
-    for what, edit in _HARMLESS.items():
-        yield Fault(AREA, f"goes on: {what}", functools.partial(_same, edit=edit), GOES_ON)
+    yield from each(AREA, "goes on: {}", _goes_on, _DAMAGE)
+    yield from each(AREA, "goes on: {}", _same, _HARMLESS, GOES_ON)
     for what, run in _RUNS.items():
         yield Fault(AREA, what, run)
-    for name in ("SIGKILL", "SIGINT", "SIGTERM"):
-        run = functools.partial(_stopped, how=getattr(signal, name))
-        yield Fault(AREA, f"a run that got {name}, and again", run, GOES_ON)
-    yield Fault(AREA, "two runs into one folder", _twice)
 
 
 # -- files ----------------------------------------------------------------------------------------
 
 
 def _load(folder: Path, text: str) -> None:
-    from robot_layouts.data.suite.suite import load_suite
-
     (folder / "suite.yaml").write_text(text)
     load_suite(folder / "suite.yaml")
 
@@ -70,41 +58,30 @@ _FIELDS = {
     "name is a list": "name: [x]\nseeds: 0\ntasks: [PushT-v1]",
     "seeds is a mapping": "name: x\nseeds: {a: 1}\ntasks: [PushT-v1]",
     "tasks is a text": "name: x\nseeds: 0\ntasks: PushT-v1",
-    "tasks is a mapping": "name: x\nseeds: 0\ntasks: {PushT-v1: 0}",
     "a task is a list": f"{HEAD}  - [PushT-v1]\n",
-    "a task is a number": f"{HEAD}  - 5\n",
     "a task is nobody's": f"{HEAD}  - PushX-v1\n",
-    "a task is empty": f"{HEAD}  - ''\n",
     "policies is a list": f"policies: [expert]\n{SUITE}",
     "a policy is a number": f"policies: {{PushT-v1: 5}}\n{SUITE}",
     "a policy of nobody's task": f"policies: {{PushX-v1: expert}}\n{SUITE}",
-    "control_mode is a list": f"control_mode: [a]\n{SUITE}",
     "control_mode is unknown": f"control_mode: pd_ee_dance\n{SUITE}",
     "control_mode of a robot that is not there": f"control_mode: {{left: pd_joint_pos}}\n{SUITE}",
     "obs_mode is a mapping": f"obs_mode: {{a: 1}}\n{SUITE}",
     "obs_mode is unknown": f"obs_mode: smell\n{SUITE}",
     "randomization is a number": f"randomization: 5\n{SUITE}",
     "randomization of nothing there is": f"randomization: {{mas: 1}}\n{SUITE}",
-    "randomization below nothing": f"randomization: {{mass: {{Tee: -1}}}}\n{SUITE}",
     "layout is a number": _of("layout: 5"),
-    "layout is a list": _of("layout: [own]"),
     "layout lacks the task's place": _of("layout: {robots: {left: {robot: panda_stick}}}"),
     "layout of an unknown robot": _of("layout: {robots: {arm: {robot: pandy}}}"),
-    "layout with a key too many": _of(f"layout: {{robots: {{{ARM}}}, colour: red}}"),
     "layout far away": _of(
         "layout: {robots: {arm: {robot: panda_stick, position: [1e300, 0, 0]}}}"
     ),
     "a preset that is none": _of("layout: {preset: sqare, robots: {arm: panda_stick}}"),
-    "a preset is a list": _of("layout: {preset: [single], robots: {arm: panda_stick}}"),
     "a preset without robots": _of("layout: {preset: single}"),
-    "a preset of a number of robots": _of("layout: {preset: single, robots: 2}"),
-    "a preset with an argument too many": _of("layout: {preset: single, robots: {a: panda}, x: 1}"),
     "a preset of no distance": _of(
         "layout: {preset: ring, robots: {arm: panda_stick}, radius: -1}"
     ),
     "layout and layouts": _of("layout: own, layouts: {own: own}"),
     "layouts is empty": _of("layouts: {}"),
-    "layouts is a list": _of("layouts: [own]"),
     "an unknown key": f"seed: 1\n{SUITE}",
     "an unknown key of a task": _of("sedes: 1"),
 }
@@ -112,10 +89,7 @@ _FIELDS = {
 _NAMES = {
     "a name of a suite is a path": SUITE.replace("name: x", "name: ../x"),
     "a name is a path": _of("name: ../../First"),
-    "a name is hidden": _of("name: .First"),
     "a name is of 101 letters": _of(f"name: {'x' * 101}"),
-    "a name with a line's end": _of('name: "First\\nLater"'),
-    "a name with a null character": _of('name: "a\\0"'),
     "a name in Cyrillic letters": _of("name: Аrm"),
     "a name twice": SUITE.replace("Later", "First"),
     "a name of a layout is a path": _of("layouts: {/etc: own}"),
@@ -124,8 +98,7 @@ _NAMES = {
 _SEEDS = {
     f"seeds are {seeds}": _of(f"seeds: {seeds}")
     for seeds in (
-        "-1", "0.5", "1e12", "nan", "[]", "''", "9-0", "0-3-5", "0-4294967295", "[0-2, 1]",
-        "4294967296", "[[0]]", "{0: 1}", "0x10", "'9999999999-9999999999'",
+        "-1", "0.5", "1e12", "[]", "9-0", "0-4294967295", "[0-2, 1]", "{0: 1}",
     )
 }  # fmt: skip
 
@@ -138,15 +111,11 @@ _BOMBS = {
     "an alias": f"a: &a 1\nb: *a\n{SUITE}",
     "billion laughs": "a0: &a0 [ha, ha]\n"
     + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 12)),
-    "an anchor that contains itself": "name: &n {a: *n}",
     "a Python object": "!!python/object/apply:os.system ['touch ran']",
-    "a Python name": "name: !!python/name:os.system",
     "100,000 brackets": "[" * 100_000,
-    "100,000 mappings in one another": "{a: " * 100_000,
     "a megabyte of remarks": "#" * 2**20,
     "a suite of 100,000 cases of 100,000 seeds": "name: x\nseeds: 0-99999\ntasks:\n"
     + "".join(f"  - {{task: x, name: a{i}}}\n" for i in range(100_000)),
-    "a null character": f"{SUITE}\0",
 }
 
 
@@ -157,23 +126,16 @@ SECRET = "password of somebody else"
 _ELSEWHERE = {
     "/etc/passwd": "/etc/passwd",
     "a file above it": "../secret.yaml",
-    "a file above it, by a detour": "inside/../../secret.yaml",
     "a link that leads out": "link.yaml",
     "below a link that leads out": "link/secret.yaml",
     "a link to itself": "itself.yaml",
-    "its own folder": ".",
-    "no name": "''",
     "a name with a null character": '"a\\0b"',
-    "a name of 5,000 letters": "x" * 5000,
     "in a home": "~/secret.yaml",
 }
 
 
 def _reads_nothing(folder: Path, key: str, value: str) -> None:
     """Read a suite in a folder below that of a secret; no message tells the secret."""
-    from robot_layouts.data.suite.suite import load_suite
-    from robots import RobotLayoutsError
-
     (folder / "secret.yaml").write_text(SECRET)
     own = folder / "theirs"
     (own / "inside").mkdir(parents=True)
@@ -200,36 +162,22 @@ _GADGETS = {
 
 
 def _runs_nothing(folder: Path, words: tuple[str, ...], text: str) -> None:
-    """Look at a suite in a folder of a stranger's; whatever of theirs runs leaves a file."""
-    mark = folder / "ran"
-    (folder / "strange.py").write_text(f"import pathlib\npathlib.Path({str(mark)!r}).touch()\n")
-    (folder / "browser").write_text(f"#!/bin/sh\ntouch '{mark}'\n")
-    (folder / "browser").chmod(0o700)
-    (folder / "arm.xacro").write_text("<robot name=\"${open('ran', 'w')}\"/>")
-    (folder / "cell.yaml").write_text("version: 1\nrobots: {arm: {robot: 'strange:ROBOT'}}")
+    """Look at a suite in a folder of a stranger's."""
+    lay_bait(folder)
     (folder / "suite.yaml").write_text(text)
-    environment = {"BROWSER": str(folder / "browser"), "PYTHONDONTWRITEBYTECODE": "1"}
-    before = sorted(folder.iterdir())
-    try:
-        run_command("robot_layouts", "suite", *words, cwd=folder, env={**os.environ, **environment})
-    finally:
-        assert sorted(folder.iterdir()) == before, "something of it ran"
+    runs_nothing(folder, "suite", *words)
 
 
 # -- runs -----------------------------------------------------------------------------------------
 
 
 def _suite(folder: Path, text: str = SUITE) -> Any:
-    from robot_layouts.data.suite.suite import load_suite
-
     (folder / "mine.yaml").write_text(text)
     return load_suite(folder / "mine.yaml")
 
 
 def _play(folder: Path, policy: Any = POLICY, text: str = SUITE, **how: Any) -> Mapping[str, Any]:
     """Play a suite into the folder's ``run``, and return the hashes of its receipts."""
-    from robot_layouts.data.suite.run import run_suite
-
     run = run_suite(_suite(folder, text), folder / "run", policy, **{"workers": 0, **how})
     return {name: receipt.hash for name, receipt in run.receipts.items()}
 
@@ -238,13 +186,10 @@ def _receipt(folder: Path, case: str = "First") -> Path:
     return folder / "run" / "receipts" / f"{case}.json"
 
 
-def _replaced(old: str, new: str) -> Callable[[Path], object]:
-    def edit(folder: Path) -> None:
-        text = _receipt(folder).read_text()
-        assert old in text
-        _receipt(folder).write_text(text.replace(old, new, 1))
-
-    return edit
+def _replaced(old: str, new: str, folder: Path) -> None:
+    text = _receipt(folder).read_text()
+    assert old in text
+    _receipt(folder).write_text(text.replace(old, new, 1))
 
 
 def _link(folder: Path) -> None:
@@ -254,16 +199,13 @@ def _link(folder: Path) -> None:
 
 _DAMAGE: dict[str, Callable[[Path], object]] = {
     "a receipt is half": lambda folder: os.truncate(_receipt(folder), 500),
-    "a receipt is empty": lambda folder: os.truncate(_receipt(folder), 0),
     "a receipt is a folder": lambda folder: (_receipt(folder).unlink(), _receipt(folder).mkdir()),
     "a receipt is a FIFO": lambda f: (_receipt(f).unlink(), os.mkfifo(_receipt(f))),
     "a receipt is /dev/zero": _link,
-    "a receipt was changed": _replaced('"success": false', '"success": true'),
-    "a receipt of another seed": _replaced('"seed": 0', '"seed": 7'),
-    "a receipt of another task": _replaced('"id": "PushT-v1"', '"id": "PickCube-v1"'),
+    "a receipt was changed": partial(_replaced, '"success": false', '"success": true'),
+    "a receipt of another task": partial(_replaced, '"id": "PushT-v1"', '"id": "PickCube-v1"'),
     "a receipt of another case": lambda f: _receipt(f, "Later").rename(_receipt(f)),
     "its suite is another": lambda f: (f / "run" / "suite.yaml").write_text(_of("seeds: 5")),
-    "its suite is damaged": lambda f: (f / "run" / "suite.yaml").write_text("name: ["),
     "its suite names a module": lambda f: (f / "run" / "suite.yaml").write_text(
         f"{HEAD}  - strange:Task-v1\n"
     ),
@@ -272,7 +214,6 @@ _DAMAGE: dict[str, Callable[[Path], object]] = {
 
 _HARMLESS: dict[str, Callable[[Path], object]] = {
     "a receipt is gone": lambda folder: _receipt(folder).unlink(),
-    "all receipts are gone": lambda f: [path.unlink() for path in (f / "run/receipts").iterdir()],
     "a file that was half written": lambda folder: (
         _receipt(folder).with_name(".First.json.123.partial").write_text("{")
     ),
@@ -305,18 +246,13 @@ def _another(folder: Path) -> None:
 
 
 def _verify(folder: Path, **how: Any) -> None:
-    from robot_layouts.data.suite.run import verify_run
-
     _play(folder)
     verify_run(folder / "run", workers=0, **how)
 
 
-def _into(make: Callable[[Path], object]) -> Callable[[Path], None]:
-    def run(folder: Path) -> None:
-        make(folder / "run")
-        _play(folder)
-
-    return run
+def _into(make: Callable[[Path], object], folder: Path) -> None:
+    make(folder / "run")
+    _play(folder)
 
 
 _RUNS: dict[str, Callable[[Path], None]] = {
@@ -330,12 +266,11 @@ _RUNS: dict[str, Callable[[Path], None]] = {
     "a policy of no task of it": lambda f: _play(f, {"PickCube-v1": POLICY}) and None,
     "cases that it has not": lambda folder: _play(folder, only=["Frist"]) and None,
     "fewer than no workers": lambda folder: _play(folder, workers=-1) and None,
-    "into a file": _into(Path.touch),
-    "into a FIFO": _into(os.mkfifo),
-    "into /dev/full": _into(lambda path: path.symlink_to("/dev/full")),
-    "into a link to itself": _into(lambda path: path.symlink_to("run")),
-    "into a folder of something else": _into(
-        lambda path: (path.mkdir(), (path / "thesis.tex").touch())
+    "into a file": partial(_into, Path.touch),
+    "into a FIFO": partial(_into, os.mkfifo),
+    "into /dev/full": partial(_into, lambda path: path.symlink_to("/dev/full")),
+    "into a folder of something else": partial(
+        _into, lambda path: (path.mkdir(), (path / "thesis.tex").touch())
     ),
     "verify: nobody is named to play": _verify,
     "verify: a policy that is not there": lambda folder: _verify(folder, policy="no.such:policy"),
@@ -343,46 +278,3 @@ _RUNS: dict[str, Callable[[Path], None]] = {
         run_command("robot_layouts", "suite", "verify", str(f)) and None
     ),
 }
-
-
-def _begun(folder: Path, text: str) -> subprocess.Popen[bytes]:
-    """Begin a run in a process of its own, and wait for its first receipt."""
-    (folder / "mine.yaml").write_text(text)
-    words = ["suite", "run", folder / "mine.yaml", "--out", folder / "run", "--policy", POLICY]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "robot_layouts", *words, "--workers=1"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    deadline = time.monotonic() + 90
-    while not _receipt(folder).exists():
-        assert process.poll() is None, "it ended by itself"
-        assert time.monotonic() < deadline, "it does not begin"
-        time.sleep(0.02)
-    return process
-
-
-def _stopped(folder: Path, how: signal.Signals) -> str:
-    """Stop a run after its first case; the next one plays the rest, and no bit differs."""
-    process = _begun(folder, SUITE.replace("1-2", "1-10"))
-    process.send_signal(how)
-    process.wait(60)
-    played = sorted(path.stem for path in (folder / "run" / "receipts").glob("*.json"))
-    changed = _receipt(folder).stat().st_mtime_ns
-    again = _play(folder, text=SUITE.replace("1-2", "1-10"))
-    assert _receipt(folder).stat().st_mtime_ns == changed, "it was played again"
-    elsewhere = folder / "elsewhere"
-    elsewhere.mkdir()
-    assert _play(elsewhere, text=SUITE.replace("1-2", "1-10")) == again
-    return f"{' and '.join(played)} was kept, the rest was played; no bit differs"
-
-
-def _twice(folder: Path) -> None:
-    process = _begun(folder, LONG)
-    before = _receipt(folder).read_bytes()
-    try:
-        _play(folder, "tests.data.policies:still", LONG, only=["Later"])
-    finally:
-        process.terminate()
-        process.wait(60)
-        assert _receipt(folder).read_bytes() == before

@@ -1,14 +1,12 @@
-"""Teleoperation: what people and policies ask of a session that it cannot do, and what it keeps."""
+"""Teleoperation: what policies ask of a session that it cannot do, and what it keeps."""
 
 from __future__ import annotations
 
-import math
 import resource
 import signal
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -17,21 +15,11 @@ import tasks
 from robot_layouts.data.reading.recording import FILE, Recording
 from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.data.teleop.session import Session
-from robots import RecordingError, TaskError
+from robots import RecordingError
 from tests.faults.fault import GOES_ON, Fault
 
 AREA = "teleoperation"
 HOME = (0.0, 0.0, 0.3, 0.0, 1.0, 0.0, 0.0)
-
-
-class Locked:
-    """A policy that cannot be copied."""
-
-    def __init__(self) -> None:
-        self.lock = Lock()
-
-    def __call__(self, observation: Any) -> Any:
-        return np.zeros(8)
 
 
 def _raises(error: BaseException) -> Callable[[Any], Any]:
@@ -41,37 +29,19 @@ def _raises(error: BaseException) -> Callable[[Any], Any]:
     return policy
 
 
-ASKED: dict[str, Callable[[Session], object]] = {
-    "an arm that there is not": lambda session: session.aim("left", HOME),
-    "a place that is no number": lambda session: session.aim("arm", (math.nan, *HOME[1:])),
-    "a pose without a quaternion": lambda session: session.aim("arm", HOME[:3]),
-    "a quaternion of length 2": lambda session: session.aim("arm", (*HOME[:3], 0, 2, 0, 0)),
-    "a move without end": lambda session: session.shift("arm", (math.inf, 0, 0)),
-    "a step that was not taken": lambda session: session.undo(3),
-    "an episode without steps to be kept": lambda session: session.keep(),
-    "a policy where there is none": lambda session: session.give_back(),
-}
 POLICIES: dict[str, Any] = {
     "raises": _raises(KeyError("layer9")),
     "ends the program": _raises(SystemExit("enough")),
     "returns nothing": lambda observation: None,
     "returns too few numbers": lambda observation: np.zeros(7),
-    "returns what is no number": lambda observation: np.full(8, math.nan),
-    "returns rows of different lengths": lambda observation: [[0.0], [0.0, 0.0]],
-    "is a class": Locked,
     "is no function": 5,
-    "cannot be copied": Locked(),
 }
 
 
 def faults() -> Iterator[Fault]:
     """Go through this area's faults."""
-    for what, ask in ASKED.items():
-        yield Fault(AREA, f"people ask for {what}", partial(_asked, ask))
     for what, policy in POLICIES.items():
         yield Fault(AREA, f"a policy {what}", partial(_advised, policy))
-    yield Fault(AREA, "a task of two environments", _two_environments)
-    yield Fault(AREA, "a policy raises in the middle of an episode", _goes_on, GOES_ON)
     yield Fault(AREA, "the disk is full when an episode is kept", _full_disk, GOES_ON)
     yield Fault(AREA, "an arm is to go a thousand kilometres away", _far, GOES_ON)
 
@@ -81,42 +51,12 @@ def _task() -> tasks.TaskEnv:
     return tasks.make("PickCube-v1")
 
 
-def _asked(ask: Callable[[Session], object], folder: Path) -> None:
-    ask(Session(_task()))
-
-
 def _advised(policy: Any, folder: Path) -> None:
     session = Session(_task(), policy=policy)
     try:
         session.step()
     finally:
         assert not session.actions
-
-
-def _two_environments(folder: Path) -> None:
-    Session(tasks.make("PickCube-v1", num_envs=2))
-
-
-def _goes_on(folder: Path) -> None:
-    left = iter(range(3))
-
-    class Ends:
-        def __call__(self, observation: Any) -> Any:
-            next(left)
-            return np.zeros(8)
-
-    with Recorder(folder / FILE, _task()) as recorder:
-        session = Session(_task(), recorder, policy=Ends())
-        for _ in range(3):
-            session.step()
-        try:
-            session.step()
-        except TaskError:
-            session.take_over()
-        session.step()
-        session.keep()
-    with Recording(folder / FILE) as file:
-        assert [len(episode.actions) for episode in file] == [4]
 
 
 def _full_disk(folder: Path) -> str:

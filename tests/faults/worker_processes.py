@@ -133,17 +133,11 @@ def wait_until(met: Callable[[], Any], otherwise: str) -> None:
         time.sleep(0.01)
 
 
-def run_script(folder: Path, text: str, limit: str = "true") -> subprocess.CompletedProcess[str]:
-    """Run a script of its own in a folder, and return what it printed.
-
-    Args:
-        folder: Where it is written to and runs.
-        text: The script.
-        limit: A command of the shell that runs before, such as ``ulimit -n 16``.
-    """
+def run_script(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
+    """Run a script of its own in a folder, and return what it printed."""
     (folder / "script.py").write_text(text)
     return subprocess.run(
-        ["bash", "-c", f'{limit}; exec "$0" script.py', sys.executable],
+        [sys.executable, "script.py"],
         cwd=folder,
         capture_output=True,
         text=True,

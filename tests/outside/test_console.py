@@ -152,6 +152,8 @@ class TestNew:
             ("Torch", "a=panda", "the file would be torch.py, but 'torch' is an installed module"),
             ("Reach", "panda", "'panda' should be PLACE=ROBOT"),
             ("Reach", "a=pandda", "Did you mean 'panda'?"),
+            ("Reach", "a=nowhere/arm.urdf", "/nowhere/arm.urdf'. A robot goes by a name"),
+            ("../Reach", "a=panda", "'../Reach' cannot be the name of a task"),
         ],
     )
     def test_task_refuses(self, tmp_path, capsys, name, robot, words):

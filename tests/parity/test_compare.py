@@ -114,17 +114,14 @@ def test_only_an_exact_zero_is_zero():
     [
         (["--task", "PikCube-v1"], "unknown task 'PikCube-v1'. Did you mean 'PickCube-v1'?"),
         (["--task", "PickCube-v1", "--seeds", "0"], "--seeds is 0; it must be 1 or more"),
-        (["--task", "PickCube-v1", "--num-envs", "0"], "--num-envs is 0; it must be 1 or more"),
         (
             ["--task", "PickCube-v1", "--reward-mode", "sparce"],
             "PickCube-v1 has no reward mode 'sparce'. Did you mean 'sparse'?",
         ),
         (["--task", "PickCube-v1", "--demos", "nowhere"], "there is no folder nowhere"),
-        (["--task", "PickCube-v1", "--json", "nowhere/a.json"], "there is no folder"),
         (["--all", "--actions", "a.h5"], "give one --task"),
         ([], "give either --task or --all"),
         (["--task", "PushT-v1", "--record"], "--record keeps all of --all"),
-        (["--all", "--history", "fresh", "--record"], "--record keeps all of --all"),
     ],
 )
 def test_bad_usage(words, complaint, capsys):

@@ -1,4 +1,4 @@
-"""Where episodes come from, and what is said about files that hold none."""
+"""Where episodes come from."""
 
 import json
 
@@ -96,33 +96,3 @@ def test_find_demonstrations(tmp_path):
     assert find_demonstrations(tmp_path) == {"PushT-v1": [push], TASK: [pick]}
     with pytest.raises(TrajectoryError, match="there is no folder"):
         find_demonstrations(tmp_path / "nowhere")
-
-
-def test_a_missing_file_names_its_neighbour(tmp_path):
-    demonstration(tmp_path)
-    with pytest.raises(TrajectoryError, match=r"no file .*trajectry.h5; did you mean .*y.h5"):
-        load_episodes(tmp_path / "trajectry.h5", TASK, 8)
-
-
-def test_garbage(tmp_path):
-    path = demonstration(tmp_path, "garbage")
-    path.write_bytes(b"this is neither")
-    with pytest.raises(TrajectoryError, match="no readable episodes"):
-        load_episodes(path, TASK, 8)
-
-
-def test_a_truncated_file(tmp_path):
-    path = demonstration(tmp_path)
-    path.write_bytes(path.read_bytes()[:-200])
-    with pytest.raises(TrajectoryError, match="no readable episodes"):
-        load_episodes(path, TASK, 8)
-
-
-def test_json_missing_or_foreign(tmp_path):
-    path = demonstration(tmp_path)
-    path.with_suffix(".json").write_text('{"something": "else"}')
-    with pytest.raises(TrajectoryError, match=r"is not a demonstration's json"):
-        load_episodes(path, TASK, 8)
-    path.with_suffix(".json").unlink()
-    with pytest.raises(TrajectoryError, match=r"cannot read .*trajectory.json"):
-        load_episodes(path, TASK, 8)

@@ -47,7 +47,6 @@ def spec(*robots, files=()):
             "no descriptor here of its robot: anymal, spo",
         ),
         ("New-v1", spec("panda", "anymal"), NO_REASON),
-        ("New-v1", spec(), NO_REASON),
     ],
 )
 def test_reasons(task_id, about, why):

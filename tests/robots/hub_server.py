@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import json
 import re
 import socket
 import struct
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, ClassVar
@@ -151,16 +150,6 @@ class Handler(BaseHTTPRequestHandler):
         self.wfile.flush()
         self.close_connection = True
 
-    def send_without_length(self, pieces: Iterable[bytes], headers: dict[str, str]) -> None:
-        """Send pieces until there are no more or the client goes away."""
-        self.send_response(200)
-        for name, value in headers.items():
-            self.send_header(name, value)
-        self.end_headers()
-        self.close_connection = True
-        for piece in pieces:
-            self.wfile.write(piece)
-
     def send_page(self, status: int, text: str, headers: dict[str, str]) -> None:
         self._send(status, text.encode(), {"Content-Type": "text/html", **headers})
 
@@ -219,10 +208,15 @@ def stall(reached: threading.Event) -> Fault:
     return fault
 
 
-def compressed(handler: Handler, body: bytes) -> None:
-    """Send the file compressed, as proxies do."""
-    headers = {**_file_headers(body), "Content-Encoding": "gzip"}
-    handler.send_without_length([gzip.compress(body)], headers)
+def reset(handler: Handler, body: bytes) -> None:
+    """Reset the connection without an answer."""
+    handler.reset()
+
+
+def nonsense(handler: Handler, body: bytes) -> None:
+    """Answer in no HTTP."""
+    handler.wfile.write(b"\x16\x03\x01 this is no HTTP\r\n\r\n")
+    handler.close_connection = True
 
 
 def login_page(handler: Handler, body: bytes) -> None:

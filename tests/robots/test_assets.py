@@ -129,15 +129,6 @@ def test_one_error_names_every_source_and_what_to_do(store, physics):
     assert text.count(": missing") == len(physics)
 
 
-def test_a_local_copy_gives_only_verified_files(store, physics, fill, tmp_path):
-    elsewhere = AssetStore(tmp_path / "elsewhere")
-    fill(elsewhere, physics)
-    elsewhere.path(physics[0]).write_bytes(b"damaged")
-    with pytest.raises(AssetError, match=rf"lacks 1 files: {physics[0]} \(differs"):
-        ensure(physics, store, [LocalCopy(elsewhere.root)])
-    assert store.unusable(physics) == [physics[0]]
-
-
 def test_nothing_is_written_when_nothing_is_needed(store, physics, fill):
     fill(store, physics)
     before = sorted(store.root.rglob("*"))
@@ -152,14 +143,6 @@ def test_a_file_is_exchanged_and_never_written_over(store, physics, fill, tmp_pa
     ensure(physics, store, [FakeSource(right(physics))])
     assert store.unusable(physics) == []
     assert (tmp_path / "reader").read_bytes() == b"damaged"
-
-
-def test_what_a_killed_fetch_left_is_removed(store, physics):
-    left = store.root / ".partial" / "abc" / "file"
-    left.parent.mkdir(parents=True)
-    left.write_bytes(b"half a mesh")
-    ensure(physics, store, [FakeSource(right(physics))])
-    assert not (store.root / ".partial").exists()
 
 
 def test_a_read_only_destination_is_named(read_only_folder, physics):

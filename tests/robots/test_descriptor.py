@@ -37,18 +37,9 @@ def group(**changes) -> JointGroup:
         ({"unit": "deg"}, "unit is 'deg'; it must be 'rad' or 'm'"),
         ({"stiffness": -1.0}, "stiffness is -1.0; it must not be negative"),
         ({"damping": math.nan}, "JointGroup: damping is nan; it must be a finite number"),
-        ({"force_limit": math.inf}, "JointGroup: force_limit is inf; it must be a finite number"),
-        ({"friction": -0.1}, "friction is -0.1; it must not be negative"),
-        ({"armature": (0.1, -0.1)}, "armature is -0.1; it must not be negative"),
-        ({"armature": (0.1,)}, "armature has 1 numbers; the group has joints ('a', 'b')"),
         ({"stiffness": (1.0,)}, "stiffness has 1 numbers; the group has joints ('a', 'b')"),
-        ({"damping": (1.0, -2.0)}, "damping is -2.0; it must not be negative"),
         ({"multipliers": (1.0, -1.0)}, "only a mimic group has multipliers; ('a', 'b') is not one"),
         ({"mimic": True, "offsets": (0.0,)}, "offsets has 1 numbers; the group has joints"),
-        (
-            {"mimic": True, "offsets": (0.0, math.nan)},
-            "offsets[1] is nan; it must be a finite",
-        ),
         (
             {"leaders": ("a",), "lead": 0.1},
             "only a mimic group that is driven to places has leaders; ('a', 'b') is not one",
@@ -64,7 +55,6 @@ def group(**changes) -> JointGroup:
         ({"lower": (-1.0,)}, "lower has 1 numbers; the group ('a', 'b') takes 2"),
         ({"upper": (1.0, 2.0), "mimic": True}, "upper has 2 numbers; the group ('a', 'b') takes 1"),
         ({"upper": -1.0}, "range [-1.0, -1.0] of ('a', 'b') is not increasing"),
-        ({"lower": math.nan}, "JointGroup: lower is nan; it must be a finite number"),
     ],
 )
 def test_a_joint_group_refuses_nonsense(changes, message):
@@ -97,9 +87,7 @@ def test_a_mimic_group_takes_one_number():
     ("changes", "message"),
     [
         ({"name": "7dof"}, "robot name '7dof' must be a letter followed by letters, digits and _"),
-        ({"name": "a-b"}, "robot name 'a-b' must be a letter"),
         ({"reach": 0.0}, "panda: reach is 0.0 m; it must be positive"),
-        ({"reach": math.nan}, "panda: reach is nan; it must be a finite number"),
         ({"keyframes": {"rest": (0.0,)}}, "keyframe 'rest' has 1 numbers; the robot has 9 joints"),
         (
             {"keyframes": {"rest": (math.nan,) * 9}},
@@ -117,13 +105,9 @@ def test_a_descriptor_refuses_nonsense(changes, message):
     ("make", "message"),
     [
         (lambda: group(joints="ab"), "JointGroup: joints is 'ab'; it must be a tuple, each a text"),
-        (lambda: group(joints=("a", 5)), "JointGroup: joints[1] is 5; it must be a text"),
-        (lambda: group(lower="0"), "JointGroup: lower is '0'; it must be a finite number"),
         (lambda: group(delta=1), "JointGroup: delta is 1; it must be True or False"),
-        (lambda: group(stiffness=1e300), "stiffness is 1e+300; it must be a finite number"),
         (lambda: group(limits=((0, 1, 2), (0, 1))), "limits[0] has 3 entries; it must be a tuple"),
         (lambda: ActionSplit(arm=None), "ActionSplit['arm'] is None; it must be a JointGroup"),
-        (lambda: GripperMaterial((), 1.0, 1.0), "GripperMaterial: links is empty"),
         (lambda: GripperMaterial(("a",), -1.0, 1.0), "static_friction is -1.0; it must not be"),
         (lambda: GripperMaterial(("a",), 1.0, 1.0, 2.0), "restitution is 2.0; it must be between"),
         (lambda: Fingers(("a",)), "Fingers: links has 1 entries; it must be a tuple of 2"),
@@ -132,8 +116,6 @@ def test_a_descriptor_refuses_nonsense(changes, message):
             lambda: Fingers(("a", "b"), opening_axes=((0.0, 0.0, 0.0), (0.0, 1.0, 0.0))),
             "opening_axes is ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)); each must have a length",
         ),
-        (lambda: Fingers(("a", "b"), max_angle=-1.0), "max_angle is -1.0 degrees; it must be"),
-        (lambda: CameraMount("", "hand"), "CameraMount: name is ''; it must be a text"),
         (lambda: CameraMount("eye", "hand", width=0), "camera 'eye': width is 0 pixels"),
         (lambda: CameraMount("eye", "hand", fov=4.0), "camera 'eye': fov is 4.0 rad; it must be"),
         (lambda: CameraMount("eye", "hand", near=200.0), "it must be 0 < near < far"),
@@ -141,24 +123,10 @@ def test_a_descriptor_refuses_nonsense(changes, message):
             lambda: Home(quaternion=(0, 0, 0, 0)),
             "Home: quaternion is (0, 0, 0, 0), which has length 0",
         ),
-        (lambda: replace(PANDA, urdf="x.urdf"), "panda: urdf is 'x.urdf'; it must be a UrdfSource"),
-        (
-            lambda: replace(PANDA, keyframes=[]),
-            "panda: keyframes is []; it must be a mapping from names",
-        ),
-        (lambda: replace(PANDA, home=None), "panda: home is None; it must be a Home"),
         (lambda: replace(PANDA, name=5), "RobotDescriptor: name is 5; it must be a text"),
-        (
-            lambda: replace(PANDA, allowed_collisions=(("a", "b", "c"),)),
-            "panda: allowed_collisions[0] has 3 entries; it must be a tuple of 2, each a text",
-        ),
         (
             lambda: replace(PANDA, allowed_collisions=(("a", "b"), ("c", "c"))),
             "panda: allowed_collisions[1] has c more than once",
-        ),
-        (
-            lambda: replace(PANDA, allowed_collisions=(("a", "b"), ("b", "a"))),
-            "panda: allowed_collisions has a and b more than once",
         ),
         (
             lambda: replace(PANDA, cameras=(CameraMount("eye", "a"), CameraMount("eye", "b"))),

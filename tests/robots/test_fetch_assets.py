@@ -95,13 +95,6 @@ def test_another_folder_is_filled_from_the_local_copy(store, physics, fill, tmp_
     assert "Hub" not in said.err
 
 
-def test_the_local_source_alone_tells_what_it_lacks(store, capsys):
-    assert main(["panda", "--source", "local", "--physics-only"]) == 1
-    said = capsys.readouterr().err
-    assert "11 robot files cannot be used" in said
-    assert f"local copy {store.root}: lacks 11 files" in said
-
-
 def test_a_source_that_differs_is_refused(hub, store, physics, capsys):
     hub.files[f"robots/maniskill_panda/{MESH}"] = b"another mesh"
     arguments = ["panda", "--physics-only", "--source", "hf"]
@@ -115,18 +108,6 @@ def test_a_source_that_differs_is_refused(hub, store, physics, capsys):
 def test_the_revision_is_passed_on(hub, capsys):
     assert main(["panda", "--physics-only", "--source", "hf", "--revision", "v9"]) == 1
     assert "roboverse_data at v9: not found (404)" in capsys.readouterr().err
-
-
-def test_an_unknown_robot_is_one_line(capsys):
-    assert main(["pandas"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("error: unknown robot 'pandas'. Did you mean 'panda'?")
-    assert said.count("\n") == 1
-
-
-def test_offline_and_an_online_source_contradict_each_other(capsys):
-    assert main(["--offline", "--source", "hf"]) == 2
-    assert "needs the network" in capsys.readouterr().err
 
 
 def test_without_any_source_each_one_is_named(store, monkeypatch, no_mani_skill, capsys):

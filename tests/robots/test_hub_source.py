@@ -17,16 +17,7 @@ from robots.assets.packages import MANI_SKILL
 from robots.assets.sources import HubSource, InstalledPackage
 from robots.assets.store import FileState
 from tests.robots.conftest import PANDA
-from tests.robots.hub_server import (
-    COMMIT,
-    Fault,
-    HubServer,
-    corrupt,
-    die,
-    login_page,
-    stall,
-    status,
-)
+from tests.robots.hub_server import COMMIT, Fault, HubServer, die, login_page, stall, status
 
 pytestmark = pytest.mark.usefixtures("store", "hub_client")
 
@@ -69,8 +60,6 @@ def test_the_revision_can_come_from_the_environment(hub: HubServer, store, physi
     [
         (status(404, "RepoNotFound"), r"not found \(404\)"),
         (status(401, "RepoNotFound"), r"access refused \(401\)"),
-        (status(403, "GatedRepo"), r"access refused \(403\): the dataset is gated"),
-        (status(429), "HTTP error 429"),
         (status(500), "HTTP error 500"),
         (login_page, "not JSON, such as a login page"),
     ],
@@ -85,15 +74,6 @@ def test_an_unhelpful_hub_is_named_and_the_next_source_is_used(
     assert re.search(rf"Hub at \S+: 0 of 11 files; .*{reason}", said)
     assert "installed mani_skill: 11 of 11 files" in said
     assert "Traceback" not in said
-
-
-@pytest.mark.parametrize(
-    ("code", "reason"), [(403, r"access refused \(403\)"), (500, "HTTP error 500")]
-)
-def test_a_file_that_is_refused_is_named(hub: HubServer, store, physics, code, reason):
-    hub.fail("GET", HAND, status(code))
-    with pytest.raises(AssetError, match=rf"hand\.stl: {reason}"):
-        fetch_from_hub(store, physics)
 
 
 def test_a_missing_mesh_is_named_and_the_others_are_kept(hub: HubServer, store, physics):
@@ -115,15 +95,6 @@ def test_a_server_dying_midway_leaves_the_rest_to_the_next_source(
     assert "installed mani_skill" in said
 
 
-def test_a_file_wrong_twice_is_refused_by_name(hub: HubServer, store, physics, capfd):
-    hub.fail("GET", HAND, corrupt)
-    expected = rf"refused, as 1 files differ from the manifest, twice: maniskill_panda/{HAND}"
-    with pytest.raises(AssetError, match=expected):
-        fetch_from_hub(store, physics)
-    assert [file.path for file in store.unusable(physics)] == [HAND]
-    assert not store.path(store.unusable(physics)[0]).exists()
-
-
 def test_a_hub_that_never_answers_is_waited_for_once(store, physics, monkeypatch):
     with socket.create_server(("127.0.0.1", 0), backlog=64) as black_hole:
         monkeypatch.setenv("HF_ENDPOINT", f"http://127.0.0.1:{black_hole.getsockname()[1]}")
@@ -137,11 +108,6 @@ def test_a_hub_that_never_answers_is_waited_for_once(store, physics, monkeypatch
 def test_a_download_that_stalls_ends_after_the_clients_retries(hub: HubServer, store, physics):
     hub.fail("GET", HAND, stall(threading.Event()))
     with pytest.raises(AssetError, match=r"hand\.stl: ReadTimeout: timed out"):
-        fetch_from_hub(store, physics)
-
-
-def test_no_network_at_all_is_named(store, physics):
-    with pytest.raises(AssetError, match="Hugging Face Hub at .*Connection refused"):
         fetch_from_hub(store, physics)
 
 

@@ -13,13 +13,7 @@ from benchmarks.robots.probe import kinematic_difference
 from layouts import single
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.provenance import describe_guessed, guess_again
-from robots import (
-    AssetError,
-    DescriptorError,
-    LocalMjcf,
-    MissingPackageError,
-    RobotDescriptor,
-)
+from robots import AssetError, DescriptorError, LocalMjcf, MissingPackageError, RobotDescriptor
 from robots.from_urdf import guess_descriptor, main
 from robots.mjcf import conversion
 from robots.named import named_robot

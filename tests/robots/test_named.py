@@ -120,22 +120,6 @@ def test_a_path_without_an_ending_stays_a_path(folder):
     assert robot_in_file("./panda", "left", folder) == robot
 
 
-def test_a_suite_runs_no_code_for_its_robots(folder, capsys):
-    from robot_layouts.data.suite.suite import read_layout
-
-    robots = {"left": "panda", "right": "toy_robots:TINY"}
-    places = {place: {"robot": word} for place, word in robots.items()}
-    for layout in (
-        {"preset": "face_to_face", "robots": robots, "spacing": 1.0},
-        {"robots": places},
-    ):
-        with pytest.raises(
-            (LayoutError, DescriptorError), match="a file chooses no code that runs"
-        ):
-            read_layout(layout, folder)
-    assert "imported" not in capsys.readouterr().out
-
-
 def test_layout_commands_save_and_load_every_form(folder, capsys):
     from layouts.__main__ import main
 

@@ -12,7 +12,6 @@ import pytest
 
 from robots import DescriptorError, RobotRegistry, UnknownNameError, closest_match
 from robots.registry import CATALOGUE, ROBOTS
-from tests.quick import quick_cases
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -102,19 +101,6 @@ def test_another_package_brings_a_robot(other_package):
     assert run_with(other_package, code) == f"acme {' '.join(names)}\n"
 
 
-@pytest.mark.long
-def test_another_packages_nonsense_is_named(other_package):
-    code = (
-        "try: RobotRegistry.load('acme_nonsense')\n"
-        "except Exception as error: print(type(error).__name__, error)"
-    )
-    said = run_with(other_package, code)
-    assert said == (
-        "DescriptorError entry point 'acme:NONSENSE' of acme 1.0 gave 42, of type int;"
-        " a RobotDescriptor is needed\n"
-    )
-
-
 def add_to(other_package: Path, entry_point: str, module: str = "") -> None:
     """Let the other package bring one robot more."""
     with (other_package / "acme-1.0.dist-info" / "entry_points.txt").open("a") as lines:
@@ -124,17 +110,10 @@ def add_to(other_package: Path, entry_point: str, module: str = "") -> None:
 
 @pytest.mark.parametrize(
     ("entry_point", "module", "reason"),
-    quick_cases(
-        [
-            ("bad = broken:ARM", "raise RuntimeError('no GPU')", "RuntimeError: no GPU"),
-            ("bad = broken:ARM", "raise SystemExit(3)", "SystemExit: 3"),
-            ("bad = broken:ARM", "", "AttributeError: module 'broken' has no attribute 'ARM'"),
-            ("bad = missing:ARM", "", "ModuleNotFoundError: No module named 'missing'"),
-            ("bad = acme:ARM", "", "is listed as 'bad', but its robot is 'acme_arm'"),
-            ("bad = acme:ARM\nbad = broken:ARM", "", "'bad' is brought more than once, by entry"),
-        ],
-        [("bad = broken:ARM", "raise RuntimeError('no GPU')", "RuntimeError: no GPU")],
-    ),
+    [
+        ("bad = broken:ARM", "raise RuntimeError('no GPU')", "RuntimeError: no GPU"),
+        ("bad = acme:ARM", "", "is listed as 'bad', but its robot is 'acme_arm'"),
+    ],
 )
 def test_a_robot_that_cannot_be_loaded_is_named_and_leaves_the_others_alone(
     other_package, entry_point, module, reason

@@ -39,16 +39,10 @@ def robot(body: str) -> str:
 
 BAD = {
     "malformed": ("<robot><link", "is not a URDF: "),
-    "empty": ("", "is not a URDF: no element found"),
     "not a robot": ("<mujoco/>", "it holds <mujoco>, not <robot>"),
-    "binary": ("\x00\x01\x02", "is not a URDF: "),
     "external entity": (
         '<!DOCTYPE r [<!ENTITY e SYSTEM "file:///etc/passwd">]>' + robot(f"&e;{GOOD}"),
         "declares XML entities; a URDF has no use for them",
-    ),
-    "entity from the network": (
-        '<!DOCTYPE r SYSTEM "http://127.0.0.1:9/robot.dtd">' + robot(GOOD),
-        "declares XML entities",
     ),
     "no link": (robot(""), "has no link"),
     "joints of one name": (
@@ -88,7 +82,6 @@ BAD = {
         robot(GOOD.replace('upper="1"', 'upper="wide"')),
         "joint 'shoulder' has upper='wide' in <limit>; 1 finite number is needed",
     ),
-    "a limit that is not finite": (robot(GOOD.replace('upper="1"', 'upper="inf"')), "upper='inf'"),
     "an origin of two numbers": (
         robot(GOOD.replace('xyz="0 0 0.3"', 'xyz="0 0.3"')),
         "has xyz='0 0.3' in <origin>; 3 finite numbers are needed",
@@ -143,17 +136,9 @@ BAD = {
         robot(GOOD.replace("<box size='0.1 0.1 0.1'/>", "<cone/>")),
         "link 'upper': a collision of shape 'cone'; choices: box, sphere, cylinder, capsule, mesh",
     ),
-    "an inertia that is no number": (
-        robot(GOOD.replace('ixy="0"', 'ixy="nothing"')),
-        "link 'upper' has ixy='nothing' in <inertia>; 1 finite number is needed",
-    ),
     "a name with a newline": (
         robot(GOOD.replace('link name="lower"', 'link name="lo&#10;wer"')),
         "has a link called 'lo\\nwer'; names have at most 200 characters, all of them printable",
-    ),
-    "mimic without a joint": (
-        robot(LINKS + SHOULDER + joint("elbow", "upper", "lower", LIMIT + "<mimic/>")),
-        "joint 'elbow' mimics '', which is no joint that moves",
     ),
     "missing mesh": (
         robot(
@@ -288,18 +273,3 @@ def test_a_chain_as_long_as_physx_allows_is_read_at_once():
     assert [at.name for at in model.ordered] == [f"j{i}" for i in range(254)]
     assert model.depths["j0"] == 254
     assert model.depths["j253"] == 1
-
-
-@pytest.mark.parametrize("kind", ["FIFO", "/dev/zero", "folder"])
-def test_what_is_no_file_is_refused_at_once(kind, tmp_path):
-    path = tmp_path / "toy.urdf"
-    if kind == "FIFO":
-        os.mkfifo(path)
-    elif kind == "folder":
-        path.mkdir()
-    else:
-        path.symlink_to(kind)
-    with pytest.raises(
-        AssetError, match=rf"cannot read the URDF {path}: it is a .*, not a regular"
-    ):
-        LocalUrdf(path).locate()

@@ -23,7 +23,6 @@ pytestmark = pytest.mark.usefixtures("store")
 CHECKOUT = Path(__file__).parents[2]
 SMALL = [f for package in load_manifest().packages.values() for f in package.files]
 SMALL = [f for f in SMALL if f.bytes < 50_000 and f.origin.distribution == MANI_SKILL.name]
-FETCH = [sys.executable, "-m", "robots.fetch_assets", "panda", "--physics-only", "--source"]
 # What three programs lack, and whether they draw it.
 LACKING = {"panda": False, "so100": True, "koch": False}
 
@@ -40,10 +39,6 @@ def index(wheel, monkeypatch):
         for name, value in server.settings().items():
             monkeypatch.setenv(name, value)
         yield server
-
-
-def start_fetch() -> subprocess.Popen[str]:
-    return subprocess.Popen([*FETCH, "wheel"], cwd=CHECKOUT, stderr=subprocess.PIPE, text=True)
 
 
 def test_one_download_brings_the_files_of_all_robots_with_their_licences(
@@ -70,15 +65,6 @@ def test_what_comes_along_replaces_nothing_that_is_there(index, store, physics):
     store.path(mine).write_text("my own")
     ensure(physics, store, [PackageWheel(MANI_SKILL)])
     assert store.path(mine).read_text() == "my own"
-
-
-@pytest.mark.long
-def test_two_processes_at_once_download_once(index, store, physics):
-    fetches = [start_fetch(), start_fetch()]
-    said = [fetch.communicate(timeout=120)[1] for fetch in fetches]
-    assert [fetch.returncode for fetch in fetches] == [0, 0], said
-    assert index.downloads == 1
-    assert store.unusable(physics) == []
 
 
 @pytest.mark.long

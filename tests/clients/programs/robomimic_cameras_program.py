@@ -12,17 +12,7 @@ from robomimic.algo import RolloutPolicy, algo_factory
 from robomimic.config import config_factory
 from robomimic.utils import file_utils, obs_utils
 from robomimic.utils.dataset import SequenceDataset
-from tray_recording import (
-    CAMERAS,
-    LENGTHS,
-    ROBOTS,
-    SIZE,
-    TASK,
-    TEXT,
-    environment,
-    observed,
-    record,
-)
+from tray_recording import CAMERAS, LENGTHS, ROBOTS, SIZE, TASK, TEXT, environment, observed, record
 
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.reading.recording import Recording

@@ -1,10 +1,7 @@
 """Nothing is done to observations and actions."""
 
 from lerobot.processor import PolicyProcessorPipeline
-from lerobot.processor.converters import (
-    policy_action_to_transition,
-    transition_to_policy_action,
-)
+from lerobot.processor.converters import policy_action_to_transition, transition_to_policy_action
 
 
 def make_replay_pre_post_processors(config, dataset_stats=None):
