@@ -114,26 +114,6 @@ def test_the_view_of_an_intrinsic_matrix_varies():
     assert cx == 20
 
 
-@drawing
-def test_own_settings_come_after_those_of_all():
-    obs = reset(
-        robots="panda_wristcam",
-        sensor_configs={"hand_camera": {"width": 20}, "width": 40, "height": 24},
-    )
-    assert seen(obs).shape == (1, 24, 40, 3)
-    assert seen(obs, "hand_camera").shape == (1, 24, 20, 3)
-
-
-@drawing
-def test_each_camera_has_its_shaders():
-    making = {"cameras": [SMALL], "robots": "panda_wristcam", "obs_mode": "rgb+segmentation"}
-    mixed = reset(**making, sensor_configs={"base_camera": {"shader_pack": "default"}})
-    plain = reset(**making)
-    assert torch.equal(seen(mixed, "hand_camera"), seen(plain, "hand_camera"))
-    dtypes = [seen(mixed, name, "segmentation").dtype for name in ("base_camera", "hand_camera")]
-    assert dtypes == [torch.int64, torch.int16]
-
-
 WRONG = [
     (
         {"sensor_configs": {"base_camra": {}}},

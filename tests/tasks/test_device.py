@@ -275,29 +275,6 @@ def test_each_world_has_the_instruction_of_its_seed(engine):
         assert info["phrasing"].tolist() == [2, 6, 11]
 
 
-@pytest.mark.long
-def test_memory_grows_with_the_number_of_worlds_and_no_faster(engine):
-    import warp
-
-    def taken(count):
-        with closing(made(num_envs=count, task="PickCube-v1")) as env:
-            env.reset(seed=0)
-            env.step(torch.zeros(env.action_space.shape))
-            data = env.task.simulation.bodies._data
-            held = [part for own in (data, data.contact, data.efc) for part in vars(own).values()]
-            arrays = {id(part): part for part in held if isinstance(part, warp.array)}
-            tensors = [part for part in gc.get_objects() if isinstance(part, torch.Tensor)]
-            own = {
-                part.untyped_storage().data_ptr(): part for part in tensors if count in part.shape
-            }
-            kernels = sum(part.capacity for part in arrays.values())
-            return kernels, sum(part.untyped_storage().nbytes() for part in own.values())
-
-    (few, seen_few), (more, seen_more), (most, seen_most) = map(taken, (61, 122, 244))
-    assert most - more == 2 * (more - few) > 0
-    assert seen_most - seen_more <= 2.1 * (seen_more - seen_few)
-
-
 # -- every task -----------------------------------------------------------------------------------
 
 

@@ -172,17 +172,6 @@ def test_nothing_stays_of_what_was_played_before(plan):
             assert all(np.array_equal(one[name], other[name]) for name in one)
 
 
-@pytest.mark.long
-def test_processes_change_nothing(env, plan):
-    with closing(make(num_workers=2)) as spread:
-        for vector in (env, spread):
-            vector.reset(seed=SEEDS, options=THEIRS)
-        for one, other in zip(steps(env, plan), steps(spread, plan), strict=True):
-            for name in one[0]:
-                assert np.array_equal(one[0][name], other[0][name])
-            assert all(np.array_equal(a, b) for a, b in zip(one[1:4], other[1:4], strict=True))
-
-
 def test_films_are_black_where_nothing_is_drawn(env):
     pictures = env.call("render")
     assert len(pictures) == 3

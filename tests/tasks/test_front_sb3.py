@@ -1,7 +1,6 @@
 """Tasks behind Stable-Baselines3's interface."""
 
 import sys
-from contextlib import closing
 
 import gymnasium
 import numpy as np
@@ -22,7 +21,6 @@ pytest.importorskip("stable_baselines3")
 
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
-from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import NatureCNN
 from stable_baselines3.common.vec_env import (
@@ -40,13 +38,6 @@ SOLVED, SEED = 1, 7  # which environment succeeds; environment i gets SEED + i
 
 def make(num_workers=0, num_envs=NUM_ENVS, **fields):
     return tasks.sb3_vec_env(TASK, num_envs, num_workers, **fields)
-
-
-@pytest.fixture(scope="module")
-def spread():
-    """The same in worker processes."""
-    with closing(make(num_workers=2)) as env:
-        yield env
 
 
 @pytest.fixture(scope="module")
@@ -84,11 +75,6 @@ def test_it_says_what_their_own_vector_says(actions):
     (step, *_) = ends(ours, SOLVED)
     assert step < 49
     assert ends(ours, 0) == [49]
-
-
-@pytest.mark.long
-def test_workers_change_nothing(spread, actions):
-    np.testing.assert_equal(play(spread, actions), play(make(), actions))
 
 
 def test_an_episode_that_succeeds(actions):
@@ -206,30 +192,6 @@ def test_their_wrappers():
     assert infos[0]["terminal_observation"].shape == (70,)
 
 
-@pytest.mark.long
-def test_a_training_run_does_not_depend_on_workers(spread, tmp_path):
-    fresh = make()
-    for env in (fresh, spread):
-        env.set_options({"reconfigure": True})
-    models = [trained(fresh), trained(spread)]
-    first, second = (model.policy.state_dict() for model in models)
-    assert all((first[name] == second[name]).all() for name in first)
-    models[0].save(tmp_path / "policy")
-    again = PPO.load(tmp_path / "policy", make(), device="cpu")
-    assert evaluate(models[0]) == evaluate(again)
-
-
-def trained(env):
-    model = PPO("MlpPolicy", env, n_steps=52, batch_size=78, seed=3, device="cpu")
-    return model.learn(2 * 52 * NUM_ENVS)
-
-
-def evaluate(model):
-    env = VecMonitor(make())
-    env.seed(0)
-    return evaluate_policy(model, env, n_eval_episodes=NUM_ENVS, return_episode_rewards=True)
-
-
 def test_what_environments_say_of_themselves():
     env = make()
     assert env.get_attr("max_episode_steps", [0, 2]) == [50, 50]
@@ -288,12 +250,3 @@ def test_images_are_learned_from():
     model = PPO("MultiInputPolicy", env, n_steps=2, batch_size=4, n_epochs=1, device="cpu")
     extractors = model.learn(4).policy.features_extractor.extractors
     assert isinstance(extractors["sensor_data/base_camera/rgb"], NatureCNN)
-
-
-@pytest.mark.long
-def test_pictures():
-    if problem := vulkan_problem():
-        pytest.skip(problem)
-    with closing(make(num_envs=2, render_mode="rgb_array", timeout=None)) as env:
-        env.reset()
-        assert env.render("rgb_array").shape == (1024, 512, 3)

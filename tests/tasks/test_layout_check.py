@@ -28,14 +28,6 @@ def test_colliding_robots_are_refused_with_their_links_and_what_to_change():
     assert "check_layout=False builds it all the same" in message
 
 
-def test_they_are_built_if_told_so():
-    tasks.make(TWO, layout=crowded(), check_layout=False).close()
-
-
-def test_a_layout_that_is_clear_is_built():
-    tasks.make(TWO, layout=face_to_face(PANDAS, spacing=1.4)).close()
-
-
 def test_a_folded_arm_that_grazes_itself_with_joint_noise_is_built():
     layout = side_by_side({f"arm_{i}": "koch" for i in range(6)}, spacing="auto")
     assert layout.validate(workspaces=False).findings

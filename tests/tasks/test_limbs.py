@@ -194,13 +194,6 @@ def test_a_body_stands_behind_the_table_with_its_hands_over_it(body):
     assert table[0] < frame.x < table[2]
 
 
-def test_a_body_where_the_task_says_no_table_is_put_by_reach_alone(body):
-    own = tasks.get_task_class(HAND_OVER)
-    behind, nowhere = body.layout, at_task("mobile_panda_dual", own.layout)
-    assert nowhere["robot"].base_position[0] < behind["robot"].base_position[0]
-    assert nowhere["robot"].base_position[2] == behind["robot"].base_position[2]
-
-
 def test_a_body_drifts_nowhere_while_its_arm_moves(body):
     body.reset(seed=0)
     before = body.simulation.read().qpos("robot")[0, 18:].copy()

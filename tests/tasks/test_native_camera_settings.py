@@ -127,29 +127,6 @@ def test_shadows_and_the_picture_for_people_are_native_s(shaders: str):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("obs_mode", ["sensor_data", "pointcloud", "rgb+state"])
-@pytest.mark.parametrize("what", SETTINGS)
-def test_settings_are_native_s_in_other_modes(what: str, obs_mode: str):
-    sensors = unit(SETTINGS[what])
-    look = native_look("PickCube-v1", obs_mode, "panda_wristcam", sensors=copy.deepcopy(sensors))
-    for told in look.observations:  # which of a process's scenes it is: the number counts them
-        for images in told.get("sensor_data", {}).values():
-            if "Segmentation" in images:
-                images["Segmentation"][..., 2] = 0
-    with closing(
-        tasks.make(
-            "PickCube-v1", obs_mode=obs_mode, robots="panda_wristcam", sensor_configs=sensors
-        )
-    ) as env:
-        ours = our_look(env, look.actions)
-    for told in ours:
-        for images in told.get("sensor_data", {}).values():
-            if "Segmentation" in images:
-                images["Segmentation"][..., 2] = 0
-    assert differences(look.observations, ours) == []
-
-
-@pytest.mark.long
 def test_settings_by_native_s_names_of_two_robots():
     sensors = unit(
         {

@@ -14,7 +14,6 @@ import torch
 import tasks
 from parity.native import make_native, native_action, native_action_dim, quiet
 from robot_layouts.simulation import Camera
-from robots import RobotRegistry
 from tests.native import NATIVE, TASKS
 
 pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
@@ -100,45 +99,6 @@ CAMERA = Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1))
 def test_another_camera_is_noticed(pick: Look, mutant: Camera, part: str):
     with closing(tasks.make("PickCube-v1", obs_mode=EVERYTHING, cameras=[mutant])) as env:
         assert f"/{part} at 1" in differences(pick.observations, our_look(env, pick.actions))
-
-
-@pytest.mark.parametrize("what", ["light", "markers", "colour", "privileged"])
-def test_another_scene_is_noticed(pick: Look, what: str, monkeypatch: pytest.MonkeyPatch):
-    from robot_layouts.simulation.sapien3 import studio as rendering
-
-    part = "sensor_data/base_camera/rgb"
-    if what == "light":
-        monkeypatch.setattr(rendering, "SKY", (0.31, 0.3, 0.3))
-    elif what == "markers":
-        looked = rendering.Studio.look
-        monkeypatch.setattr(
-            rendering.Studio, "look", lambda self, c, t, *, markers: looked(self, c, t, markers=1)
-        )
-    elif what == "colour":
-        cls = tasks.get_task_class("PickCube-v1")
-        cube = replace(cls.cube, color=(0.97, 0.0, 0.0, 1.0))
-        monkeypatch.setattr(cls, "bodies", {**cls.bodies, "cube": cube})
-    else:
-        part = "extra/obj_pose"
-        monkeypatch.setattr(tasks.get_task_class("PickCube-v1"), "sensed", ("*",))
-    with closing(tasks.make("PickCube-v1", obs_mode=EVERYTHING)) as env:
-        told = our_look(env, pick.actions)
-    assert any(d.startswith(f"/{part} ") for d in differences(pick.observations, told))
-
-
-@pytest.mark.long
-def test_two_robots_see_with_their_own_cameras():
-    look = native_look("TwoRobotPickCube-v1", "rgbd", steps=1)
-    with closing(tasks.make("TwoRobotPickCube-v1", obs_mode="rgbd")) as env:
-        assert differences(look.observations, our_look(env, look.actions)) == []
-    wrist = RobotRegistry.load("panda_wristcam")
-    mutant = replace(wrist, cameras=(replace(wrist.cameras[0], fov=1.5),))
-    with closing(
-        tasks.make("TwoRobotPickCube-v1", obs_mode="rgbd", robots={"right": mutant})
-    ) as env:
-        found = differences(look.observations, our_look(env, look.actions))
-        assert "/sensor_data/panda_wristcam-1-hand_camera/rgb at 0" in found
-        assert not [name for name in found if "panda_wristcam-0" in name or "base_camera" in name]
 
 
 def test_a_camera_is_turned_as_native_turns_it():

@@ -16,7 +16,7 @@ from gymnasium.wrappers import FlattenObservation
 
 import tasks
 from parity.native import make_native, native_action, native_action_dim, quiet
-from tasks.engine.pictures import as_picture, tiled
+from tasks.engine.pictures import tiled
 from tests.native import NATIVE, TASKS
 from tests.quick import quick_cases
 
@@ -176,22 +176,6 @@ def test_normals_and_albedo_are_those_of_natives_default_shaders():
     assert not torch.equal(first["normal"], last["normal"])
 
 
-def test_a_difference_is_noticed(pick: Any):
-    _, seen = watch(pick, ("pointcloud", "state_dict"), steps=0)
-    (cloud, space), (state, _) = seen["pointcloud"][0], seen["state_dict"][0]
-    with closing(tasks.make("PickCube-v1", obs_mode="pointcloud")) as env:
-        ours, _ = env.reset(SEED, {"reconfigure": True})
-        assert differences(cloud, ours) == []
-        ours["pointcloud"]["xyzw"][0, 5, 0] += 1e-6
-        assert differences(cloud, ours) == ["/pointcloud/xyzw"]
-        assert space_differences(space, env.single_observation_space) == []
-    flags = {**state["extra"], "is_grasped": state["extra"]["is_grasped"].float()}
-    assert differences(state, {**state, "extra": flags}) == ["/extra/is_grasped"]
-    backwards = dict(reversed(state["extra"].items()))
-    assert differences(state, {**state, "extra": backwards})[0].startswith("keys: ")
-    assert differences({**cloud, "sensor_data": {}}, {**cloud, "sensor_data": cloud})
-
-
 # Both observe flags.
 @pytest.mark.parametrize(
     "task_id", quick_cases(["PickCube-v1", "StackPyramid-v1"], ["StackPyramid-v1"])
@@ -256,14 +240,6 @@ def test_pictures_of_several_sizes_lie_where_native_puts_them():
             pictures = [rng.integers(0, 255, (2, *s, 3)).astype(np.uint8) for s in order[:count]]
             expected = natively([torch.from_numpy(p) for p in pictures])
             assert torch.equal(torch.from_numpy(tiled(pictures)), expected)
-
-
-def test_each_environment_is_shown_by_itself():
-    near = np.arange(12, dtype=np.int16).reshape(1, 3, 4, 1)
-    both = as_picture("depth", np.concatenate([near, 3 * near]))
-    for depth, shown in zip((near, 3 * near), both, strict=True):
-        assert np.array_equal(as_picture("depth", depth)[0], shown)
-    assert (both.min(), both.max()) == (0, 255)
 
 
 # -- the whole table -------------------------------------------------------------------------

@@ -4,7 +4,6 @@ import gc
 import multiprocessing
 import os
 import pickle
-import resource
 import signal
 import sys
 import weakref
@@ -17,7 +16,6 @@ import numpy as np
 import pytest
 
 import tasks
-from benchmarks.soak import read_level
 from robot_layouts.core.processes.transport import RemoteError, SentError, packed
 from robot_layouts.core.processes.worker import Status, Worker
 from robot_layouts.simulation.rendering import vulkan_problem
@@ -25,7 +23,6 @@ from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
 from tasks.interfaces.workers import VectorWorkerError
-from tests.fresh_process import in_fresh_process
 from tests.tasks import breaking
 
 TASK = "PushCube-v1"
@@ -90,41 +87,6 @@ def test_what_nobody_holds_is_freed_unclosed(front):
         assert world() is None
 
 
-def growth(front, cycles):
-    """Return how many MB some cycles of make and close add, after the first 100."""
-    for _ in range(100):
-        FRONTS[front]().close()
-    before = read_level().memory
-    for _ in range(cycles):
-        FRONTS[front]().close()
-    return read_level().memory - before
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("front", ["task", "gymnasium", "vector"])
-def test_memory_is_flat_over_two_thousand_environments(front):
-    assert in_fresh_process(growth, front, 1900) < 5.0
-
-
-def levels(cycles):
-    """Return what this process holds after 20 cycles with two workers, and after all."""
-    found = []
-    for i in range(cycles):
-        with vector(2) as env:
-            env.step(ACTION)
-        if i in (19, cycles - 1):
-            found.append(read_level())
-    return found
-
-
-@pytest.mark.long
-def test_nothing_grows_over_five_hundred_vectors_with_workers():
-    first, last = in_fresh_process(levels, 500)
-    assert last.memory - first.memory < 5.0
-    for quantity in ("descriptors", "threads", "processes", "shared"):
-        assert getattr(last, quantity) == getattr(first, quantity)
-
-
 # -- how they start -------------------------------------------------------------------------------
 
 
@@ -180,18 +142,6 @@ def test_a_daemonic_process_may_have_a_vector():
         assert this.daemon
     finally:
         this.daemon = False
-
-
-@contextmanager
-def descriptors(more):
-    """Allow so many file descriptors more than there are."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    few = len(os.listdir("/proc/self/fd")) - 1 + more
-    resource.setrlimit(resource.RLIMIT_NOFILE, (few, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 # -- errors ---------------------------------------------------------------------------------------

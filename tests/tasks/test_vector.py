@@ -10,7 +10,6 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 import tasks
 from robots import ActionError, TaskError, UnknownNameError
 from tasks.interfaces.vector import VectorTask
-from tests.native import NATIVE, pair
 from tests.quick import quick_cases
 
 NUM_ENVS = 3
@@ -106,36 +105,6 @@ def test_workers_change_nothing(mode):
         assert differences(play(env, mode, 63), together) == []
         assert env.num_workers == WORKERS
         assert env.metadata["autoreset_mode"] is mode
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
-def test_workers_change_nothing_in_any_task(task_id):
-    mode = AutoresetMode.NEXT_STEP
-    together = play(make(task_id), mode, 12)
-    with closing(make(task_id, num_workers=WORKERS)) as env:
-        assert differences(play(env, mode, 12), together) == []
-
-
-@pytest.mark.long
-def test_it_begins_and_goes_on_as_the_batched_task_does():
-    """PegInsertionSide draws its geometry at every reset."""
-    task_id = "PegInsertionSide-v1"
-    task = tasks.make(task_id, num_envs=NUM_ENVS)
-    action = np.zeros((NUM_ENVS, 8), np.float32)
-    with closing(make(task_id, num_workers=WORKERS)) as env:
-        for seed in (2022, None):
-            obs, info = env.reset(seed=seed)
-            np.testing.assert_array_equal(obs, task.reset(seed)[0].numpy())
-            np.testing.assert_array_equal(env.step(action)[0], task.step(action)[0].numpy())
-            assert info["seed"].tolist() == [2022, 2023, 2024]
-
-
-def test_a_difference_is_noticed():
-    mode = AutoresetMode.NEXT_STEP
-    first, second = play(make(), mode, 3), play(make(), mode, 3, seed=8)
-    assert differences(first, play(make(), mode, 3)) == []
-    assert "/0/0" in differences(first, second)
 
 
 def test_an_ended_episode_waits_for_its_reset():
@@ -292,23 +261,3 @@ def test_pictures():
         pictures = env.render()
     assert [p.shape for p in pictures] == [(512, 512, 3)] * 2
     assert (pictures[0] != pictures[1]).any()
-
-
-@pytest.mark.long
-@NATIVE[0]
-@NATIVE[1]
-@NATIVE[2]
-@pytest.mark.parametrize("task_id", ["PickCube-v1"])
-def test_each_environment_is_a_native_one(task_id):
-    native = pair(task_id, num_envs=4).native
-    rng = np.random.default_rng(1)
-    with closing(make(task_id, num_envs=4, num_workers=2)) as env:
-        obs, _ = env.reset(seed=30, options={"reconfigure": True})
-        rows = native.reset(range(30, 34), range(4), rebuild=True)
-        np.testing.assert_array_equal(obs, rows["observation", "observation"])
-        for _ in range(25):
-            action = rng.uniform(-1.5, 1.5, (4, 8)).astype(np.float32)
-            obs, reward, *_ = env.step(action)
-            rows = native.step(action)
-            np.testing.assert_array_equal(obs, rows["observation", "observation"])
-            np.testing.assert_array_equal(reward, rows["reward", "reward"])

@@ -184,16 +184,6 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
     assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1, 1, 1]
 
 
-@pytest.mark.long
-def test_an_error_in_a_worker_is_told_with_its_place(shared):
-    with pytest.raises(
-        VectorWorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*workers.py"
-    ):
-        shared._call("no_such_method", {0: ()}, lambda: None)
-    shared.restart()
-    assert shared.step(ACTION)[0].shape == (4, 42)
-
-
 def test_closing_leaves_nothing():
     VectorTask("PickCube-v1", num_envs=1, num_workers=1).close()  # what stays is there from now on
     before, open_before = workers(), len(os.listdir("/proc/self/fd"))

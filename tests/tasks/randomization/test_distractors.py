@@ -11,7 +11,7 @@ import tasks
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.scene.parts import Part
 from robots import TaskError, UnknownNameError
-from tasks import Camera, Distractors, Light, Randomization, TaskEnv, Uniform, Whole
+from tasks import Camera, Distractors, Randomization, TaskEnv, Uniform, Whole
 
 NAMES = [f"distractor_{i}" for i in range(4)]
 SOME = Distractors(count=Whole(0, 4))
@@ -152,19 +152,6 @@ def test_what_finds_no_place_is_left_out() -> None:
     env.reset(seed=0)
     assert drawn(env)["count"] == 1
     assert env.simulation.read().position("distractor_1")[0, 2] > 900
-
-
-def test_other_draws_stay_what_they_are() -> None:
-    def lights(distractors: Distractors | None) -> Any:
-        light = {"top": Light(strength=Uniform(0, 1))}
-        varied = Randomization(lights=light, distractors=distractors)
-        env = tasks.make("PickCube-v1", randomization=varied)
-        obs, _ = env.reset(seed=5)
-        about = env.drawn()
-        assert about is not None
-        return about["lights"], obs.tolist()
-
-    assert lights(None) == lights(SOME)
 
 
 @pytest.mark.usefixtures("renderer")
