@@ -94,19 +94,6 @@ def test_a_picture_of_parts_is_that_of_the_whole(task_id: str):
                 expect_same(env.simulation)
 
 
-@pytest.mark.long  # draws the cameras of every task
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
-def test_it_is_with_the_cameras_of_every_task(task_id: str):
-    with closing(tasks.make(task_id, obs_mode="rgb")) as env:
-        cameras = env.observer.cameras
-        for seed in range(2):
-            env.reset(seed=seed)
-            env.step(np.ones((1, *env.single_action_space.shape), np.float32))
-            both = [pictures(env.simulation, layered=x, cameras=cameras) for x in (True, False)]
-            for laid, whole in zip(*both, strict=True):
-                np.testing.assert_array_equal(laid, whole)
-
-
 def test_a_hand_s_camera_draws_only_what_is_before_it():
     hand = {"arm": "panda_wristcam"}
     with closing(tasks.make("PickCube-v1", robots=hand, obs_mode="rgb")) as env:
@@ -118,18 +105,6 @@ def test_a_hand_s_camera_draws_only_what_is_before_it():
             hidden = {body.entity.name for body in studio_of(env.simulation)._bodies._hidden}
             assert {"panda_link0", "panda_link1"} <= hidden
             assert not hidden & {"table-workspace", "cube", "panda_leftfinger"}
-
-
-def test_what_no_camera_sees_is_not_drawn():
-    simulation = built(RED, GREEN)
-    away = {"away": CAMERAS["away"]}
-    pictures(simulation, layered=True, cameras=away)
-    bodies = studio_of(simulation)._bodies
-    assert len(bodies._moving) >= 10
-    assert bodies._hidden == {*bodies._moving, *bodies._still}
-    pictures(simulation, layered=True)
-    assert not bodies._hidden & set(bodies._moving)
-    expect_same(simulation)
 
 
 def test_what_stands_still_is_drawn_again_where_it_was_moved():

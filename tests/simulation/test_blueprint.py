@@ -49,13 +49,6 @@ def test_a_shape_that_sapien_leaves_out_is_an_error(urdf):
     assert not blueprint.checked
 
 
-def test_the_shapes_are_counted_once(urdf):
-    blueprint = read_blueprint(descriptor(urdf), visuals=False)
-    for _ in range(2):
-        blueprint.build(sapien.Scene([sapien.physx.PhysxCpuSystem()]), sapien.Pose())
-        assert blueprint.checked
-
-
 def test_a_file_url_is_read(urdf):
     urdf.write_text(toy(mesh(f"file://{urdf.parent}/arm.stl")))
     assert shapes(urdf) == [1, 1, 1]

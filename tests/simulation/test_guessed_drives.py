@@ -79,11 +79,6 @@ def test_a_stretched_arm_moves_one_joint_alone_as_physics_has_its_motors(tmp_pat
     assert with_motors < 0.1 < without
 
 
-def test_efforts_bound_the_forces_where_they_suffice(tmp_path):
-    arm = guess_descriptor(weighing(0.5, 60.0).write(tmp_path), "made").descriptor
-    assert arm.action_split.groups["arm"].force_limit == 60.0
-
-
 def test_efforts_that_move_nothing_are_raised_and_the_reason_says_so(tmp_path):
     found = guess_descriptor(weighing(20.0, 1.0).write(tmp_path), "made")
     forces = [drive[2] for drive in found.descriptor.action_split.groups["arm"].drives]

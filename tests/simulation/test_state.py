@@ -44,12 +44,6 @@ def test_joints_that_are_held_are_no_gripper():
     np.testing.assert_allclose(fetch.read().gripper_opening("arm"), [0.3])
 
 
-def test_base_positions_are_where_the_layout_says(env: TaskEnv):
-    state = state_of(env)
-    for name, y in (("left", -0.75), ("right", 0.75)):
-        np.testing.assert_allclose(state.base_position(name), [[0.0, y, 0.0]] * 2, atol=1e-6)
-
-
 def test_speed_and_spin_are_norms(env: TaskEnv):
     for world in worlds_below(env.simulation):
         world.bodies["cube"].component.set_linear_velocity([0.3, 0.0, 0.4])

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from layouts import Layout, Placement, face_to_face, side_by_side, single
+from layouts import face_to_face, side_by_side, single
 from objects.shapes import Capsule, Cylinder
 from robot_layouts.simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
 from robot_layouts.simulation.control.joint_positions import JointPositionController
@@ -77,36 +77,6 @@ def test_a_cylinder_lies_along_its_x_axis():
     assert high - low == pytest.approx([0.2, 0.02, 0.02], abs=1e-3)
 
 
-def test_robots_stand_where_the_layout_says():
-    layout = face_to_face({"left": "panda", "right": "panda_stick"}, spacing=1.5)
-    simulation = Simulation(layout, with_cube, 2, PhysicsSettings())
-    stand(simulation)
-    state = simulation.read()
-    for name, y in (("left", -0.75), ("right", 0.75)):
-        base = state.link_position(name, "panda_link0")
-        np.testing.assert_allclose(base, [[0.0, y, 0.0]] * 2, atol=1e-6)
-        reach = state.tcp_position(name) - base
-        assert (reach[:, 1] * -y > 0.4).all(), "each arm reaches towards the other"
-
-
-def test_each_robot_of_three_is_driven_and_seen_alone():
-    names = ("first", "second", "third")
-    layout = side_by_side(dict.fromkeys(names, "panda"), spacing=1.0)
-    simulation = Simulation(layout, with_cube, 1, PhysicsSettings())
-    for moved in names:
-        stand(simulation)
-        before = simulation.read()
-        action = np.zeros((1, layout.action_dim), np.float32)
-        action[:, layout.action_split[moved]] = 0.5
-        for _ in range(5):
-            simulation.step(action, simulation.read().joint_positions)
-        after = simulation.read()
-        for name in names:
-            change = (after.qpos(name) - before.qpos(name))[:, :7]
-            change = np.abs(change).max()
-            assert (change > 0.05) == (name == moved), (moved, name, change)
-
-
 def test_grasp_and_forces():
     simulation = Simulation(single({"arm": "panda"}), with_cube, 2, PhysicsSettings())
     stand(simulation)
@@ -145,26 +115,6 @@ def test_targets_follow_the_action_split():
     assert targets[7] == targets[8] == pytest.approx(-0.01, abs=1e-8), "both fingers, clipped"
     assert targets[9] == np.float32(9) + np.float32(0.05)
     assert np.array_equal(targets[10:], qpos[0, 10:])
-
-
-def test_joints_in_another_order_are_mapped_by_name():
-    panda = RobotRegistry.load("panda")
-    arm = panda.action_split.groups["arm"]
-    backwards = dataclasses.replace(arm, joints=arm.joints[::-1])
-    robot = dataclasses.replace(
-        panda,
-        action_split=panda.action_split.replace(arm=backwards),
-        keyframes={k: (*v[6::-1], *v[7:]) for k, v in panda.keyframes.items()},
-    )
-    action = np.array([[1, 0, 0, 0, 0, 0, 0, 0]], np.float32)
-    moved = []
-    for descriptor, number in ((panda, action), (robot, action[:, [6, 5, 4, 3, 2, 1, 0, 7]])):
-        simulation = Simulation(single({"arm": descriptor}), with_cube, 1, PhysicsSettings())
-        stand(simulation)
-        simulation.step(number, simulation.read().joint_positions)
-        moved.append(simulation.read().qpos("arm"))
-    assert np.array_equal(moved[0], moved[1][:, [*range(6, -1, -1), 7, 8]])
-    assert moved[0][0, 0] > 0.01
 
 
 def test_a_descriptor_that_contradicts_its_urdf_is_refused():
@@ -244,14 +194,6 @@ def test_anchored_bodies_return_and_velocities_vanish():
     assert state.position("table-workspace")[0] == pytest.approx([-0.12, 0, -0.9196429])
     assert not state.linear_velocity("cube").any()
     assert not state.qvel("arm").any()
-
-
-def test_several_placements_of_one_robot_are_separate_articulations():
-    layout = Layout(
-        {f"r{i}": Placement("panda", (0.0, float(i), 0.0), (1, 0, 0, 0), "rest") for i in range(4)}
-    )
-    world = BuiltWorld(layout)
-    assert len({id(a) for a in world.articulations}) == 4
 
 
 def controlled(**changes) -> tuple[Simulation, JointPositionController]:
