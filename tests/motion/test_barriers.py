@@ -95,17 +95,6 @@ def test_what_moves_away_is_no_barrier():
     assert proof(Cell(raised(), [box("floor", (4.0, 4.0, 0.9), (0.0, 0.0, -0.45))])) is not None
 
 
-def test_postures_that_are_cut_off_are_left_out():
-    cell = Cell(raised(), table=TABLE)
-    near = cell.start.copy()
-    near[PAN] = 1.0
-    cut_off, reachable = behind(cell)[None, :6], near[None, :6]
-    ends = asked(cell, cut_off, reachable).reachable_ends()
-    assert np.array_equal(ends[:, :6], reachable)
-    with pytest.raises(NoPlanError, match="shoulder_lift_joint would have to pass"):
-        asked(cell, cut_off, cut_off).reachable_ends()
-
-
 def asked(cell, candidates, others):
     target = PlaceGoal("arm", "arm", np.arange(6), candidates, "", lambda: others)
     return Query(
