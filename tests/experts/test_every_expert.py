@@ -25,6 +25,7 @@ OF_50 = {
     "PushCube-v1": 48,
     "PushT-v1": 45,
     "RollBall-v1": 48,
+    "TwoRobotPickCube-v1": 48,
 }
 FEWER = {"DrawTriangle-v1": 20, "PushT-v1": 20}  # of these seeds, as each takes seconds
 FAILURES_OF_10 = {"PickCubeSO100-v1": 2}  # 0 of the others

@@ -238,22 +238,6 @@ def test_a_waypoint_waits_for_another_robot(two_arms):
     assert set(fingers[: fingers.index(OPEN)]) == {CLOSED}
 
 
-def test_every_attempt_starts_in_a_new_world(two_arms):
-    """PhysX remembers contacts across resets, so that a plan made in an old world may not hold."""
-    two_arms.begin(0)
-    before = two_arms.task.simulation.worlds[0]
-    two_arms.begin(0)
-    assert two_arms.task.simulation.worlds[0] is not before
-
-
-def test_where_an_attempt_ended_is_told(two_arms):
-    two_arms.begin(0)
-    attempt = two_arms.play({"left": (Waypoint("idle"),)})
-    assert not attempt.success
-    assert attempt.reason == "the episode ended at left.idle, right.start"
-    assert len(attempt.actions) == 100
-
-
 def both_to_the_middle(scene: Scene) -> list[Pose]:
     return [(np.array([0.0, 0.0, 0.3]), scene.tcp("left")[1])]
 
