@@ -6,10 +6,9 @@ import pytest
 
 from objects import ObjectRegistry
 from objects.inspect import report
-from objects.picture import PIXELS, draw, rasterized, save_sheet
+from objects.picture import draw
 from objects.registry import CATALOGUE
 from robot_layouts.__main__ import main
-from robots import DescriptorError
 
 
 def test_the_list_has_a_line_for_each(capsys):
@@ -49,22 +48,6 @@ def test_a_picture_shows_every_thing_that_was_named(tmp_path, capsys):
     assert len(draw([ObjectRegistry.load(name) for name in CATALOGUE]).axes) == len(CATALOGUE)
 
 
-def test_grasps_are_drawn_if_asked_for(tmp_path):
-    mug = [ObjectRegistry.load("mug")]
-    plain, marked = (draw(mug, grasps=grasps) for grasps in (False, True))
-    assert len(plain.axes[0].lines) == 0
-    assert len(marked.axes[0].lines) == len(mug[0].grasps)
-
-
-def test_the_nearest_triangle_is_seen():
-    corners = np.array([(-1, -1, 0), (3, -1, 0), (-1, 3, 0), (-1, -1, 1), (1, -1, 1), (-1, 1, 1.0)])
-    triangles, paints = np.array([[3, 4, 5], [0, 1, 2], [0, 2, 1]]), np.eye(3)
-    picture = rasterized(corners, triangles, paints, np.zeros(2), 1.0, PIXELS)
-    assert picture[-2, 1] == pytest.approx([1, 0, 0, 1])  # the lower left one is of the near one
-    assert picture[1, -3] == pytest.approx([0, 1, 0, 1])
-    assert picture[..., 2].max() == 0  # the third faces away
-
-
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
@@ -78,8 +61,3 @@ def test_a_mistake_is_named_and_leaves_nothing(words, code, message, capsys, tmp
     assert main(["objects", *words]) == code
     assert capsys.readouterr().err.startswith(message)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_nothing_is_no_picture(tmp_path):
-    with pytest.raises(DescriptorError, match="there is nothing to draw; name one object or more"):
-        save_sheet([], tmp_path / "a.png")
