@@ -60,21 +60,3 @@ def test_what_is_known_is_not_done_again(climbed):
     assert climb(climbed, TASK) == 0
     assert (climbed / "ladder.json").read_text() == before
     assert os.stat(weights).st_mtime_ns == kept
-
-
-def test_other_layouts_are_added(climbed, capfd):
-    assert climb(climbed, TASK, "--elsewhere", TASK) == 0
-    layouts = seen(climbed)[TASK]["layouts"]
-    assert [*layouts] == ["its own", *(f"bases up to {n} cm off" for n in (1, 5))]
-    receipts = [
-        Receipt.read(climbed / "receipts" / "ladder" / one["receipt"]) for one in layouts.values()
-    ]
-    assert len({receipt.episodes[0].states for receipt in receipts}) == 3
-    assert "learning" not in capfd.readouterr().err
-
-
-def test_what_cannot_be_learned_is_said(tmp_path, capfd):
-    assert climb(tmp_path, "PushCub-v1") == 2
-    errors = capfd.readouterr().err
-    assert "Did you mean" in errors
-    assert "error: PushCub-v1 was not learned; what the example printed stands above" in errors

@@ -185,33 +185,3 @@ def test_a_receipt_is_of_the_run(path):
     assert (ROOT / "examples" / f"{example}.py").exists()
     assert receipt.policy["files"]
     assert receipt.task == describe_task(get_task_class(receipt.task["id"]))
-
-
-def test_a_run_of_imitation_is_added_and_takes_the_place_of_an_older_one(tmp_path, capsys):
-    run = {
-        "recipe": {"task": "PushCube-v1", "episodes": 3, "steps": 20, "batch": 4, "size": 96},
-        "test_seeds": [1_000_000, 1_000_003],
-        "success": 0.75,
-        "failed": [1_000_002],
-        "curve": [{"steps": 10, "success": 0.5}, {"steps": 20, "success": 1}],
-    }
-    out = tmp_path / "record.json"
-    for found in (run, {**run, "success": 1.0, "failed": []}):
-        (tmp_path / "learning_curve.json").write_text(json.dumps(found))
-        assert main(["imitation", str(tmp_path), "--out", str(out)]) == 0
-    rows = (tmp_path / "record.md").read_text().splitlines()
-    assert "| PushCube-v1, from pictures | 3 | 20 of 4 | 4 | 100 (51.0 to 100.0) | none |" in rows
-    assert (tmp_path / "record.png").read_bytes().startswith(b"\x89PNG")
-    assert main(["reinforcement", str(tmp_path), "--out", str(tmp_path / "other.json")]) == 2
-    assert "holds no run of PPO or MAPPO" in capsys.readouterr().err
-
-
-@pytest.mark.long
-def test_a_cell_is_searched_once(tmp_path):
-    out, words = tmp_path / "seen.json", ["placing", "--cells", "three small arms"]
-    assert main([*words, "--out", str(out)]) == 0
-    before, cell = out.read_text(), json.loads(out.read_text())["cells"]["three small arms"]
-    assert cell["search"]["clear"]
-    assert cell["search"]["shared"] > cell["ring"]["shared"]
-    assert main([*words, "--out", str(out)]) == 0
-    assert out.read_text() == before

@@ -9,15 +9,11 @@ from benchmarks import planning
 from benchmarks.__main__ import main
 from benchmarks.planning import (
     ALONE,
-    FLOOR,
     Place,
-    RandomPostures,
-    random_cell,
     table_of,
 )
 from layouts import face_to_face
 from robot_layouts.motion import Motion
-from robot_layouts.motion.collision.cell import Cell
 
 LEANING = np.array([0, 0.9, 0, 0.6, 0, 0, 0, 0, 0])  # rad; of a Panda, from its start
 LINE = {
@@ -31,17 +27,6 @@ LINE = {
 SOLVED = {"solved": True, "certified": True, "collisions": 0, "clearance": 0.0123}
 EXECUTED = {"executed": True, "touching": [], "stray": 0.0021, "late": 0.0}
 REFUSED = {"solved": False, "seconds": 0.1, "message": ""}
-
-
-@pytest.mark.long
-def test_a_seed_gives_one_cell_with_one_row_of_postures():
-    layout = random_cell(1, 2)
-    assert layout == random_cell(1, 2)
-    assert layout != random_cell(2, 2)
-    cell = Cell(layout, table=FLOOR)
-    first, second = (next(RandomPostures(cell, 0.01).drawn((1, 2, 3))) for _ in range(2))
-    assert np.array_equal(first, second)
-    assert cell.checker(clearance=0.01).free(first[None])[0]
 
 
 def test_a_motion_on_which_robots_meet_is_seen_to_touch(monkeypatch):
@@ -94,17 +79,3 @@ def test_the_table_counts_every_miss():
         "| 2 | 5 | 60.0% | 75.0% | 60.0% | 0.10 | 0.22 | 0.29 | 0.30 | 100.0% | 0 | 12.3"
         " | 2 of 3 | 1 | 2.1 | 1 | 1 | 1 | 1 of 2 |"
     )
-
-
-def test_a_page_shows_the_record(tmp_path):
-    record = tmp_path / "queries.jsonl"
-    record.write_text(json.dumps(LINE | SOLVED | {"seconds": 0.1}) + "\n")
-    path = tmp_path / "page.md"
-    words = ["planning", "--cells", "0", "--out", str(record), "--page", str(path)]
-    assert main(words) == 0
-    text = path.read_text()
-    assert "1 queries to `robot_layouts.motion.plan` in 1 random" in text
-    assert (
-        "Of the 2 arms, 1 were made by\n`RobotDescriptor.from_urdf` from URDFs of pybullet" in text
-    )
-    assert text.splitlines()[-1] == table_of(planning.read(record)).splitlines()[-1]

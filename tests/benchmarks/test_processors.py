@@ -10,7 +10,7 @@ from platform import libc_ver
 
 import pytest
 
-from benchmarks.asking import EMULATOR, PLAIN, Setting, answers_under
+from benchmarks.asking import EMULATOR, PLAIN, answers_under
 from benchmarks.processors import (
     EXPERT,
     PACKAGES,
@@ -25,7 +25,6 @@ from benchmarks.processors import (
     settings,
 )
 from benchmarks.receipts import CELLS, STEPS, ways
-from robots import SimulationError
 
 RECORD = Path(__file__).parents[2] / "docs/processors.json"
 FEW = [
@@ -63,12 +62,6 @@ def test_an_emulated_processor_computes_the_same():
     native = play_under(settings()[PORTABLE], FEW)
     assert not differences(FEW, native, play_under(settings()["Nehalem, portable"], FEW))
     assert differences(FEW, native, play_under(settings()["Nehalem, as it is"], FEW))
-
-
-@pytest.mark.long
-def test_a_process_that_ends_too_early_is_reported():
-    with pytest.raises(SimulationError, match="after 0 of 1 answers"):
-        play_under(Setting("", {}), [Played("PickCubr-v1", 0, EXPERT, 0)])
 
 
 @pytest.mark.long

@@ -1,10 +1,5 @@
 """``python -m benchmarks soak``: what is healthy passes, and what leaks is reported."""
 
-import os
-import subprocess
-import sys
-import threading
-import time
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 
@@ -17,7 +12,6 @@ from benchmarks.soak import (
     between_laps,
     complaints,
     growth,
-    read_level,
 )
 from tasks import register_task
 from tests.data import leaking_tasks
@@ -78,68 +72,10 @@ def test_laps_are_compared_task_by_task():
 
 
 @contextmanager
-def a_file():
-    with open(os.devnull):
-        yield
-
-
-@contextmanager
 def memory():
     kept = [b"x" * 20_000_000]
     yield
     kept.clear()
-
-
-@contextmanager
-def a_thread():
-    over = threading.Event()
-    thread = threading.Thread(target=over.wait)
-    thread.start()
-    yield
-    over.set()
-    thread.join()
-    while os.path.exists(f"/proc/self/task/{thread.native_id}"):  # the system's end comes later
-        time.sleep(0.001)
-
-
-@contextmanager
-def a_process_that_was_not_waited_for():
-    process = subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.DEVNULL)
-    yield
-    process.wait()
-
-
-@contextmanager
-def shared_memory():
-    descriptor = os.memfd_create("a-test")
-    yield
-    os.close(descriptor)
-
-
-def levels_around(held) -> tuple[Level, Level, Level]:
-    before = read_level()
-    with held():
-        during = read_level()
-    return before, during, read_level()
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("held", "expected"),
-    [
-        (a_file, {"descriptors": 1}),
-        (memory, {"memory": pytest.approx(20e6 / 2**20, abs=1)}),
-        (a_thread, {"threads": 1}),
-        (a_process_that_was_not_waited_for, {"processes": 1}),
-        (shared_memory, {"descriptors": 1, "shared": 1}),
-    ],
-)
-def test_what_is_held_is_counted(held, expected):
-    before, during, after = in_fresh_process(levels_around, held)
-    for name in ("descriptors", "threads", "processes", "shared"):
-        assert getattr(during, name) - getattr(before, name) == expected.get(name, 0)
-        assert getattr(after, name) == getattr(before, name)
-    assert during.memory - before.memory == expected.get("memory", pytest.approx(0, abs=1))
 
 
 @pytest.mark.parametrize(
