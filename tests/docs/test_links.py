@@ -79,38 +79,6 @@ def test_the_readme_declares_the_tutorials_task():
     assert declared == [(ROOT / "docs/tutorials/tray.py").read_text(encoding="utf-8")]
 
 
-class TestText:
-    @pytest.fixture
-    def root(self, tmp_path):
-        (tmp_path / "docs").mkdir()
-        (tmp_path / "docs" / "other.md").write_text("# A title: with `code`\n")
-        for made in ("runs", "data", "site", "assets_cache", ".venv"):
-            (tmp_path / made).mkdir()
-        return tmp_path
-
-    @pytest.mark.parametrize(
-        ("text", "broken"),
-        [
-            ("[a](other.md) ![b](other.md)", []),
-            ("[a](othr.md)", ["othr.md"]),
-            ("![b](../pictures/b.png)", ["../pictures/b.png"]),
-            ("[a](other.md#a-title-with-code)", []),
-            ("[a](other.md#a-titel)", ["other.md#a-titel"]),
-            ("# Here\n[a](#here)", []),
-            ("# Here\n[a](#there)", ["#there"]),
-            ("[a](https://example.org/x.md)", []),
-            ("see `docs/other.md`", []),
-            ("see `docs/othr.md`", ["docs/othr.md"]),
-            ("see `docs/NAME.md`, `outside/trajectory.h5`", []),
-            ("see `runs/demo`, `data/trajectory.h5`, `site/index.html`", []),
-            ("see `assets_cache/robots/panda.urdf`, `.venv/bin/python`", []),
-            ("```\n[a](othr.md) `docs/othr.md`\n```", []),
-        ],
-    )
-    def test_what_is_broken(self, root, text, broken):
-        assert broken_in_text(text, root / "docs" / "page.md", root) == broken
-
-
 @pytest.mark.parametrize(
     ("html", "address"),
     [
