@@ -78,14 +78,6 @@ def test_it_records_learns_and_leaves_its_files(example, learned, tmp_path, caps
     assert (tmp_path / "policy.pt").read_bytes() == (learned / "policy.pt").read_bytes()
 
 
-def test_another_seed_makes_other_weights(example, learned, recording, tmp_path):
-    words = [*WORDS, "--seed", "1", "--recording", str(recording), "--out", str(tmp_path)]
-    example.main(words)
-    found, other = weights(tmp_path), weights(learned)
-    assert not torch.equal(found["network.0.weight"], other["network.0.weight"])
-    assert torch.equal(found["linear.weight"], other["linear.weight"])
-
-
 def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, tmp_path):
     words = [*WORDS, "--recording", str(recording), "--out", str(tmp_path)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -123,12 +115,6 @@ def test_actions_become_the_positions_that_they_turn_to(example, recording):
     turns = 0.1 * episode.actions[:, :7]  # rad: the range of pd_joint_delta_pos
     assert np.allclose(positions[:, :7], seen[:, :7] + turns, atol=1e-6)
     assert np.array_equal(positions[:, 7], episode.actions[:, 7])  # the gripper's
-
-
-def test_arms_are_shaken_and_grippers_are_not(example):
-    noise = example.shaking(example.Recipe("TwoRobotPickCube-v1", shake=0.3)).action_noise
-    assert set(noise) == {"left.arm", "right.arm"}
-    assert {size.std for size in noise.values()} == {0.3}
 
 
 def test_chunks_hold_the_last_action(example):
@@ -196,11 +182,3 @@ def test_a_recording_that_does_not_serve_is_refused(example, recording, tmp_path
     assert example.main(words) == 1
     assert "has 2 episodes, not 3" in capsys.readouterr().err
     assert not (tmp_path / "policy.pt").exists()
-
-
-def test_it_takes_a_task_of_the_present_folder(example, tmp_path, monkeypatch, capsys):
-    (tmp_path / "mine.py").write_text("")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    assert example.main(["mine:Tray-v1", "--out", "run"]) == 1
-    assert "Importing 'mine' registered no such task" in capsys.readouterr().err
