@@ -94,10 +94,6 @@ def test_a_wrong_one_in_yaml_has_its_line():
         Layout.from_yaml(TEXT.replace(POSE, "pd_ee_delta_poses"))
 
 
-def test_without_one_a_layout_is_in_deltas():
-    assert PAIR.control_mode() == CONTROL_MODES[0]
-
-
 @pytest.mark.parametrize(
     "mode", [*CONTROL_MODES, {"left": POSE}, {"left": POSE, "right": "pd_joint_vel"}]
 )

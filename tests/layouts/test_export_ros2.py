@@ -112,14 +112,6 @@ def test_meshes_are_in_the_package(package, expanded):
     assert kinds == {"mesh", "box", "sphere", "cylinder"}  # no capsules, which ROS has not
 
 
-def test_all_joints_have_what_ros_demands(expanded):
-    for joint in expanded.findall("joint"):
-        limit = joint.find("limit")
-        if joint.get("type") != "fixed":
-            assert float(limit.get("velocity")) > 0
-            assert float(limit.get("effort")) > 0
-
-
 def test_disabled_pairs_are_those_of_the_check(cell, srdf):
     found = {
         frozenset((pair.get("link1"), pair.get("link2"))): pair.get("reason")

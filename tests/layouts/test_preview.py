@@ -106,26 +106,6 @@ def test_long_names_fit_into_the_list_and_the_plan():
         assert plan.bbox.x0 < text.get_window_extent().x0
 
 
-def test_overlap_is_darker_than_what_one_robot_reaches():
-    near = face_to_face({"left": "panda", "right": "panda"}, spacing=1.2)
-    figure = draw(near)
-    image, _ = pixels(near, figure)
-    in_overlap, in_one = (
-        image[len(image) - round(y), round(x)].sum()
-        for x, y in figure.axes[0].transData.transform([(0.1, 0.1), (0.1, 1.1)])
-    )
-    assert in_overlap < in_one - 30
-
-
-def test_robots_that_share_nothing_have_no_overlap_note():
-    far, near = (
-        draw(face_to_face({"left": "panda", "right": "panda"}, spacing=spacing)).axes[0]
-        for spacing in (3.0, 1.5)
-    )
-    assert far.get_title(loc="right") == ""
-    assert near.get_title(loc="right") == "grey: within reach of two or more"
-
-
 @pytest.mark.parametrize("name", ["one", "two", "six"])
 def test_a_png_of_the_promised_width(name, tmp_path):
     from matplotlib.image import imread
@@ -142,12 +122,6 @@ def test_other_formats(suffix, start, tmp_path):
     path = LAYOUTS["two"].preview(str(tmp_path / f"cell{suffix}"))
     assert path.read_bytes().startswith(start)
     assert {suffix} < set(SUPPORTED)
-
-
-def test_the_table_is_drawn_under_the_robots(tmp_path):
-    plain = draw(LAYOUTS["two"])
-    with_table = draw(LAYOUTS["two"], table=(-0.7, -1.2, 0.5, 1.2))
-    assert len(with_table.axes[0].patches) == len(plain.axes[0].patches) + 1
 
 
 @pytest.mark.parametrize("table", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, math.nan, 1)])

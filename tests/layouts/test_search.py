@@ -52,10 +52,6 @@ class TestResult:
         assert found.volume > 1.3 * before.volume
 
     @pytest.mark.long
-    def test_it_can_be_written(self, pair):
-        assert Layout.from_yaml(pair.to_yaml()) == pair
-
-    @pytest.mark.long
     def test_another_process_gets_the_same(self, pair):
         code = (
             "from layouts import search; print(search("
@@ -63,10 +59,6 @@ class TestResult:
         )
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
         assert done.stdout.decode() == pair.to_yaml()
-
-    @pytest.mark.long
-    def test_another_seed_gets_others(self, pair):
-        assert search(PAIR, CUBE, reached_by="all", seed=1, **QUICK) != pair
 
 
 class TestWhoReaches:
@@ -240,14 +232,6 @@ def test_a_robot_that_touches_itself_is_refused(tmp_path):
         search({"arm": folded}, **QUICK)
 
 
-def test_a_long_search_tells_how_far_it_is(monkeypatch, capsys):
-    monkeypatch.setattr("robot_layouts.core.progress.PATIENCE", 0.0)
-    search({"arm": "so100"}, {"cube": (0.0, 0.0, 0.1)}, **QUICK)
-    said = capsys.readouterr().err
-    assert "looking for places: who can reach cube\n" in said
-    assert "looking for places: beginning 1, " in said
-
-
 @pytest.mark.long
 def test_the_function_is_no_module():
     assert callable(layouts.search)
@@ -274,16 +258,6 @@ class TestCommand:
         assert Layout.load(file) == layout
         assert picture.read_bytes().startswith(b"\x89PNG")
 
-    @pytest.mark.long
-    def test_who_reaches_what(self, capsys):
-        words = "left=panda right=so100 --target cube=0.1,0,0.15 --target bin=0,0.1,0.15"
-        status, out, _ = self.run(f"{words} --reached-by right --reached-by bin=left,right", capsys)
-        assert status == 0
-        (cube,) = [line for line in out.splitlines() if "cube (" in line]
-        (bin_,) = [line for line in out.splitlines() if "bin (" in line]
-        assert "right reaches it" in cube
-        assert "left reaches it, right reaches it" in bin_
-
     @pytest.mark.parametrize(
         ("words", "message"),
         [
@@ -299,11 +273,3 @@ class TestCommand:
         assert (status, out) == (2 if "unknown" in err else 1, "")
         assert message in err
         assert "Traceback" not in err
-
-    @pytest.mark.long
-    def test_what_is_left_out_is_told_by_the_exit_status(self, capsys):
-        words = "arm=so100 --target cube=0,0,0.1 --target moon=0,0,3 --partial"
-        status, out, _ = self.run(words, capsys)
-        assert status == 1
-        assert "no robot reaches moon" in out
-        assert "cube (0, 0, 0.1): arm reaches it" in out

@@ -12,13 +12,11 @@ from layouts import (
     Layout,
     Placement,
     around_table,
-    face_to_face,
     side_by_side,
     yaw_quaternion,
 )
 from layouts.frames import Pose
 from layouts.validation.collisions import (
-    _measure,
     nearest,
     stand,
     touching,
@@ -108,22 +106,11 @@ class TestPandas:
         nearer = side_by_side(PANDAS, spacing=advised - 0.02).validate(workspaces=False)
         assert nearer.findings
 
-    def test_four_robots_over_a_table(self):
-        layout = circle(("panda", "panda_stick", "panda_wristcam", "so100"), 0.9)
-        report = layout.validate(table=(-1.5, -1.5, 1.5, 1.5), targets=[(0.3, 0.0, 0.3)])
-        assert report.ok
-        assert len(report.clearances) == 6 + 4
-
     def test_eight_mixed_robots_in_a_ring(self):
         report = circle(MIXED, 1.2).validate()
         assert report.ok, str(report)
         assert len(report.clearances) == 28
         assert "and 16 pairs that stay farther apart" in str(report)
-
-    def test_eight_in_too_small_a_ring_are_refused(self):
-        report = circle(MIXED, 0.5).validate(workspaces=False)
-        assert not report.ok
-        assert "collision" in kinds(report)
 
 
 class TestDistances:
@@ -233,59 +220,6 @@ class TestDistances:
         text = urdf(link("base", shape), link("top", ""), joint("turn", "base", "top"))
         (between,) = pair(robot(tmp_path, text, ["turn"]), 0.3).validate().clearances
         assert between.distance == pytest.approx(0.2, abs=5e-4)
-
-    @pytest.mark.parametrize("move", [(0.0, 0.0, 0.0, 1.0), (1.5, -2.0, 0.3, 2.5)])
-    def test_a_layout_moved_as_a_whole_keeps_them(self, move):
-        *shift, yaw = move
-        layout = face_to_face({"left": "panda", "right": "so100"}, spacing=0.8)
-        turned = {}
-        for name, placement in layout.items():
-            x, y, z = placement.base_position
-            w, _, _, k = placement.base_quaternion
-            angle = 2 * math.atan2(k, w) + yaw
-            c, s = math.cos(yaw), math.sin(yaw)
-            place = (c * x - s * y + shift[0], s * x + c * y + shift[1], z + shift[2])
-            turned[name] = replace(placement, position=place, quaternion=yaw_quaternion(angle))
-        (before,), (after,) = (
-            one.validate(workspaces=False).clearances for one in (layout, Layout(turned))
-        )
-        assert after.distance == pytest.approx(before.distance, abs=1e-6)
-        assert after.links == before.links
-        assert after.noisy_distance == pytest.approx(before.noisy_distance, abs=1e-6)
-
-
-def nearest_of_all(one, other):
-    """Return the least distance of all hulls in all postures, each measured."""
-    places = np.ndindex(len(one.poses), len(one.hulls), len(other.hulls))
-    return min(_measure(one, other, *place).distance for place in places)
-
-
-class TestNearest:
-    """What is left out of the measuring, because planes or boxes part it, is never the nearest."""
-
-    def standing(self, name, kind, random, place):
-        robot_ = RobotRegistry.load(kind)
-        limits = np.clip(load_model(robot_).kinematics.limits, -2.0, 2.0)
-        qpos = random.uniform(*limits.T, (3, len(limits)))
-        pose = Pose(place, yaw_quaternion(random.uniform(0, 6)))
-        return stand(name, pose, load_model(robot_), qpos)
-
-    @pytest.mark.parametrize("distance", [0.3, 0.6, 1.2, 3.0])
-    @pytest.mark.parametrize("kinds", [("so100", "koch"), ("panda_stick", "so100")])
-    def test_it_is_the_nearest_of_all(self, kinds, distance):
-        random = np.random.default_rng(round(distance * 10))
-        one = self.standing("one", kinds[0], random, (0.0, 0.0, 0.0))
-        other = self.standing("other", kinds[1], random, (distance, 0.2, 0.1))
-        expected = nearest_of_all(one, other)
-        first = nearest(one.first, other.first)
-        for known in (None, first):
-            assert nearest(one, other, None, known).distance == pytest.approx(expected, abs=1e-9)
-
-    def test_beyond_ten_metres_there_is_none(self):
-        random = np.random.default_rng(0)
-        one = self.standing("one", "so100", random, (0.0, 0.0, 0.0))
-        other = self.standing("other", "so100", random, (30.0, 0.0, 0.0))
-        assert nearest(one, other) is None
 
 
 class TestSelfCollisions:
@@ -522,11 +456,6 @@ class TestDraws:
         monkeypatch.setattr("robot_layouts.core.progress.PATIENCE", 0.0)
         side_by_side(PANDAS, spacing=0.3).validate()
         assert "checking the layout: left with right\n" in capsys.readouterr().err
-
-    def test_a_short_one_does_not(self, capsys):
-        pair("panda_stick", 0.6).validate(workspaces=False, samples=0)
-        pair("panda_stick", 0.6).validate(workspaces=False, samples=0)
-        assert capsys.readouterr().err == ""
 
 
 class TestPicture:

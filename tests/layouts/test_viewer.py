@@ -13,7 +13,6 @@ from benchmarks.teleop import served
 from layouts import side_by_side, single
 from layouts.__main__ import main
 from layouts.viewer import ShownCell, ShownMotion, Thing, ViewerError
-from layouts.viewer.cell import LinkContact
 from layouts.viewer.page import NO_SLIDERS, CellPage, contacts_text, save_html
 from layouts.viewer.server import serving
 from layouts.visuals import MOST_TRIANGLES, coloured, read_visuals, simplified
@@ -157,12 +156,6 @@ def test_overlaps_are_named_and_marked():
         for contact in contacts
         for robot, link in zip(contact.robots, contact.links, strict=True)
     }
-
-
-def test_many_overlaps_are_counted():
-    many = [LinkContact(("a", "b"), (f"link{i}", "tip"), 0.01) for i in range(9)]
-    assert contacts_text(many).splitlines()[-1] == "- and 3 more"
-    assert contacts_text([]) == "No robot touches another or itself."
 
 
 def test_the_timeline_moves_robots_and_things():

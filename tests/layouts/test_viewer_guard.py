@@ -7,7 +7,6 @@ import urllib.request
 from types import SimpleNamespace
 from urllib.parse import urlsplit
 
-import msgspec
 import pytest
 
 from layouts.viewer import ViewerError
@@ -256,15 +255,6 @@ def test_names_make_nodes_of_their_own():
     assert as_html("one\ntwo") == "one<br>two"
 
 
-def test_a_link_with_a_slash_hangs_on_no_other_link(tmp_path):
-    cell = small_cell(tmp_path, upper="upper", lower="upper/lower")
-    with site(cell) as running:
-        nodes = running.server.scene._handle_from_node_name
-        assert "/arm/collision/upper" in nodes
-        assert "/arm/collision/upper%2Flower" in nodes
-        assert "/arm/collision/upper/lower" not in nodes
-
-
 @pytest.mark.parametrize("name", ["floor", "things", "tables", "WorldAxes", "arm"])
 def test_a_robot_of_any_name_replaces_nothing_of_the_scene(name, tmp_path):
     from layouts import single
@@ -318,20 +308,3 @@ def test_a_page_that_cannot_be_written_is_refused(where, tmp_path):
     with pytest.raises(ViewerError, match="^cannot write "):
         save_html(small_cell(tmp_path), tmp_path / name)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder.html", "small.urdf"]
-
-
-def test_controls_are_told_apart_by_what_they_take(open_site):
-    from layouts.viewer.guard import fits
-
-    handles = open_site.server.gui._gui_input_handle_from_uuid
-    takes = {}
-    for uuid, handle in handles.items():
-        for value in (0.5, True, "1 ×", 5, "no"):
-            message = {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}
-            if fits(open_site.server, msgspec.msgpack.encode(message)):
-                takes.setdefault(type(handle).__name__, set()).add((type(value), value))
-    assert takes == {
-        "GuiSliderHandle": {(float, 0.5)},
-        "GuiCheckboxHandle": {(bool, True)},
-        "GuiButtonHandle": {(bool, True)},
-    }
