@@ -1,7 +1,5 @@
 """Observing with cameras: what is drawn, when, for whom, and what each front makes of it."""
 
-import subprocess
-import sys
 from contextlib import closing
 
 import gymnasium
@@ -15,7 +13,6 @@ from robot_layouts.simulation import Camera
 from robot_layouts.simulation.rendering import Observers, vulkan_problem
 from robots import SimulationError, TaskError
 from tests.fresh_process import in_fresh_process
-from tests.simulation.test_rendering import run_without_driver
 
 TASK = "PickCube-v1"
 SMALL = [Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1), width=48, height=32)]
@@ -33,27 +30,6 @@ drawing = pytest.mark.usefixtures("drawn")
 
 def seen(obs, camera: str = "base_camera", texture: str = "rgb") -> torch.Tensor:
     return obs["sensor_data"][camera][texture]
-
-
-@pytest.mark.long
-def test_states_need_nothing_that_draws():
-    code = (
-        "import sys, tasks\n"
-        "for mode in ('state', 'state_dict', 'none'):\n"
-        "    tasks.make('PickCube-v1', obs_mode=mode).reset(seed=0)\n"
-        "room = 'robot_layouts.simulation'\n"
-        "drawing = (f'{room}.rendering', f'{room}.sapien3.visuals')\n"
-        "print([m for m in drawing if m in sys.modules])\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
-@pytest.mark.long
-def test_without_a_driver_one_is_told_why_there_are_no_images():
-    done = run_without_driver("import tasks\ntasks.make('PickCube-v1', obs_mode='rgb')\n")
-    assert "SimulationError: pictures need a Vulkan driver" in done.stderr
-    assert "obs_mode='state'" in done.stderr
 
 
 @drawing
@@ -155,15 +131,6 @@ def test_goals_are_shown_to_people_only():
 
 
 @drawing
-def test_a_rebuilt_world_is_seen_too():
-    with closing(tasks.make("PegInsertionSide-v1", obs_mode="rgb", robots="panda")) as env:
-        first, second = (env.reset(seed=seed)[0] for seed in (0, 1))
-        again, _ = env.reset(seed=0)
-        assert not torch.equal(seen(first), seen(second))
-        assert torch.equal(seen(first), seen(again))
-
-
-@drawing
 @pytest.mark.parametrize("task_id", ["FourRobotStack-v1", "Relay-v1", "TwoRobotPushPick-v1"])
 def test_every_robot_brings_its_cameras(task_id: str):
     cls = tasks.get_task_class(task_id)
@@ -241,21 +208,6 @@ def test_gymnasium_takes_images():
 
 
 @drawing
-def test_interfaces_show_what_cameras_see():
-    fields = {"cameras": SMALL}
-    env = gymnasium.make(f"RobotLayouts/{TASK}", render_mode="sensors", **fields)
-    env.reset(seed=3)
-    assert env.render().shape == (32, 2 * 48, 3)  # colours and depth
-    env.close()
-    vec = gymnasium.make_vec(
-        f"RobotLayouts/{TASK}", num_envs=2, num_workers=0, render_mode="all", **fields
-    )
-    vec.reset(seed=3)
-    assert [picture.shape for picture in vec.render()] == [(512, 512 + 48, 3)] * 2
-    vec.close()
-
-
-@drawing
 def test_interfaces_give_points_and_flags():
     fields = {"obs_mode": "pointcloud", "cameras": SMALL}
     env = gymnasium.make(f"RobotLayouts/{TASK}", **fields)
@@ -276,32 +228,6 @@ def test_interfaces_give_points_and_flags():
         interface.close()
     with pytest.raises(TaskError, match="parallel_env takes no obs_mode='pointcloud'"):
         tasks.parallel_env(TASK, **fields)
-
-
-@pytest.mark.long
-@drawing
-@pytest.mark.parametrize("num_workers", [0, 1])
-def test_a_vector_gives_the_same_images(num_workers: int):
-    fields = {"obs_mode": "rgbd", "cameras": SMALL}
-    vec = gymnasium.make_vec(
-        f"RobotLayouts/{TASK}",
-        num_envs=2,
-        num_workers=num_workers,
-        autoreset_mode="SameStep",
-        timeout=None,
-        **fields,
-    )
-    with closing(tasks.make(TASK, 2, **fields)) as task:
-        obs, _ = vec.reset(seed=4)
-        theirs, _ = task.reset(4)
-        for action in np.random.default_rng(0).uniform(-1, 1, (3, 2, 8)).astype(np.float32):
-            own = obs["sensor_data"]["base_camera"]
-            np.testing.assert_array_equal(own["rgb"], seen(theirs))
-            np.testing.assert_array_equal(own["depth"], seen(theirs, texture="depth"))
-            assert vec.observation_space.contains(obs)
-            theirs, *_ = task.step(action)
-            obs, *_ = vec.step(action)
-    vec.close()
 
 
 @drawing

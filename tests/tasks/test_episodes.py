@@ -193,12 +193,3 @@ def test_what_is_returned_may_be_changed_without_harm():
         assert torch.equal(outcome[0], expected)
         for value in (*outcome[:4], *outcome[4].values()):
             value.zero_()
-
-
-def test_modes():
-    sparse = tasks.make("PickCube-v1", reward_mode="sparse")
-    none = tasks.make("PickCube-v1", reward_mode="none", obs_mode="none")
-    assert sparse.step(torch.zeros(1, 8))[1].dtype == torch.float32
-    obs, reward, *_ = none.step(torch.zeros(1, 8))
-    assert obs == {}
-    assert reward.tolist() == [0.0]

@@ -161,22 +161,6 @@ def test_targets_are_part_of_the_state(mode, kind, size):
         assert not torch.equal(obs[1, entry], target[0])
 
 
-def test_worlds_do_not_disturb_each_other():
-    mode = "pd_ee_target_delta_pose"
-    rng = np.random.default_rng(0)
-    actions = rng.uniform(-1, 1, (8, 2, 7)).astype(np.float32)
-    with (
-        closing(tasks.make("PickCube-v1", num_envs=2, control_mode=mode)) as both,
-        closing(tasks.make("PickCube-v1", control_mode=mode)) as one,
-    ):
-        both.reset(seed=[5, 6])
-        one.reset(seed=6)
-        for action in actions:
-            found = both.step(action)[0]
-            expected = one.step(action[1:])[0]
-            np.testing.assert_array_equal(found[1], expected[0])
-
-
 # -- arms by name --------------------------------------------------------------------------------
 
 
@@ -201,18 +185,6 @@ def test_each_robot_observes_its_own_targets():
         own, _ = named.reset(seed=0)
         assert list(own["left"]["agent"]) == ["qpos", "qvel", "controller"]
         assert list(own["right"]["agent"]) == ["qpos", "qvel"]
-
-
-def test_limbs_have_modes_of_their_own():
-    baxter = RobotRegistry.load("baxter")
-    mixed = baxter.in_control_mode({"left": "pd_ee_delta_pose"})
-    assert mixed.action_dim == baxter.action_dim - 1
-    layout = Layout({"robot": Placement(baxter)}).in_control_mode(
-        {"left": "pd_ee_delta_pose", "robot.right": "pd_joint_pos"}
-    )
-    groups = layout["robot"].robot.action_split.groups
-    assert {g.command for n, g in groups.items() if n == "left_arm"} == {"tcp_pose"}
-    assert not any(g.delta for n, g in groups.items() if n == "right_arm")
 
 
 # -- any robot -----------------------------------------------------------------------------------

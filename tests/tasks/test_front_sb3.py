@@ -130,14 +130,6 @@ def test_a_training_run_knows_returns_and_lengths_of_episodes(wrap):
     assert all(0 < episode["r"] < 5 for episode in model.ep_info_buffer)
 
 
-def test_terminations_may_be_ignored(actions):
-    said = play(make(ignore_terminations=True), actions)
-    first, *_ = ends(play(make(), actions), SOLVED)
-    assert [ends(said, env) for env in range(NUM_ENVS)] == [[49]] * NUM_ENVS
-    assert said[2 + first][3][SOLVED]["is_success"] is True
-    assert said[2 + 49][3][SOLVED]["TimeLimit.truncated"] is True
-
-
 def test_seeds_and_options_count_once():
     env = make()
     assert env.seed(5) == [5, 6, 7]
@@ -148,22 +140,6 @@ def test_seeds_and_options_count_once():
     env.set_options({"reconfigure": 1})
     with pytest.raises(TaskError, match="the option 'reconfigure' is 1"):
         env.reset()
-
-
-def test_worlds_are_rebuilt_where_asked(monkeypatch):
-    env = make()
-    simulation = env.vector._backend.batches[0]._task.simulation
-    rebuilt, rebuild = [], simulation.rebuild
-    monkeypatch.setattr(
-        simulation, "rebuild", lambda ids, build: (rebuilt.append(ids), rebuild(ids, build))
-    )
-    env.seed(5)
-    first = env.reset()
-    env.seed(5)
-    env.set_options([{"reconfigure": True}, {}, {}])
-    np.testing.assert_array_equal(env.reset(), first)
-    env.reset()
-    assert rebuilt == [[0]]
 
 
 def test_named_observations_have_no_nested_names():

@@ -62,13 +62,6 @@ def test_the_own_layout_of_a_task_of_this_library_costs_nothing(monkeypatch):
         tasks.make(TWO, layout=crowded())
 
 
-def test_a_verdict_is_remembered(monkeypatch):
-    layout = side_by_side({"a": "panda", "b": "panda_stick"}, spacing=0.7)
-    refuse_collisions(layout)
-    monkeypatch.setattr(Layout, "validate", None)
-    refuse_collisions(side_by_side({"a": "panda", "b": "panda_stick"}, spacing=0.7))
-
-
 def test_without_fcl_it_warns_with_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "fcl", None)
     layout = face_to_face(PANDAS, spacing=1.37)

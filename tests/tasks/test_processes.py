@@ -7,7 +7,7 @@ import pickle
 import signal
 import sys
 import weakref
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from multiprocessing import util
 from pathlib import Path
 
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import tasks
-from robot_layouts.core.processes.transport import RemoteError, SentError, packed
+from robot_layouts.core.processes.transport import packed
 from robot_layouts.core.processes.worker import Status, Worker
 from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backend import worlds_below
@@ -176,36 +176,6 @@ def test_an_error_of_ours_keeps_its_type_and_says_where_it_came_from():
     with pytest.raises(TaskError, match="no such goal") as caught:
         VectorTask("Refuses-v1", 2, num_workers=1)
     assert "in build" in str(caught.value.__cause__)
-
-
-class Unprintable(TaskError):
-    def __str__(self):
-        raise ValueError("no words")
-
-
-class Unpicklable(TaskError):
-    def __reduce__(self):
-        raise ValueError("not to be pickled")
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("error", "words"),
-    [
-        (Unprintable("x"), "Unprintable: its message cannot be read"),
-        (Unpicklable("x"), "Unpicklable: x"),
-        (ValueError("x"), "ValueError: x"),
-        (breaking.Wordless(), "Wordless: its message cannot be read"),
-    ],
-)
-def test_any_error_arrives_whether_it_was_raised_or_not(error, words):
-    arrived = pickle.loads(pickle.dumps(SentError(error)))
-    assert type(arrived) is RemoteError
-    assert str(arrived) == words
-    with suppress(type(error)):
-        raise error
-    arrived = pickle.loads(pickle.dumps(SentError(error)))
-    assert "test_processes.py:" in str(arrived)
 
 
 # -- threads --------------------------------------------------------------------------------------

@@ -89,18 +89,6 @@ def test_what_a_task_does_not_offer_is_said(fields: dict[str, object], message: 
         tasks.make("PickCube-v1", **fields)
 
 
-def test_robots_can_be_swapped():
-    env = tasks.make("TwoRobotPickCube-v1", robots={"right": "panda_stick"})
-    assert env.action_split == {"left": slice(0, 8), "right": slice(8, 15)}
-    for mode in env.reward_modes:
-        other = tasks.make("TwoRobotPickCube-v1", robots={"right": "panda_stick"}, reward_mode=mode)
-        obs, reward, terminated, truncated, _ = other.step(torch.zeros(1, 15))
-        assert torch.isfinite(obs).all()
-        assert torch.isfinite(reward).all()
-        assert not terminated
-        assert not truncated
-
-
 def test_one_place_takes_a_bare_name_and_two_do_not():
     assert tasks.make("PickCube-v1", robots="panda_wristcam").layout["arm"].robot.name == (
         "panda_wristcam"

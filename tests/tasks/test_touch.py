@@ -6,7 +6,6 @@ import math
 from contextlib import closing
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 import torch
@@ -163,22 +162,6 @@ def test_it_is_sensed_beside_images():
 def test_limbs_and_hands_feel(task_id: str, robot: str, touch: Any, names: list[str]):
     with closing(tasks.make(task_id, robots=robot, touch=touch, check_layout=False)) as env:
         assert [name for name in env.observation_slices if ".touch." in name] == names
-
-
-def test_interfaces_pass_on_what_is_felt():
-    env = gymnasium.make(f"RobotLayouts/{TASK}", touch=True)
-    vec = gymnasium.make_vec(f"RobotLayouts/{TASK}", num_envs=2, num_workers=0, touch=True)
-    parallel = tasks.parallel_env("TwoRobotPickCube-v1", touch={"left": True})
-    alone, both = (interface.reset(seed=3)[0] for interface in (env, vec))
-    for action in touching_episode(TASK, 0).actions[:20]:
-        alone, both = env.step(action)[0], vec.step(np.tile(action, (2, 1)))[0]
-        np.testing.assert_array_equal(alone, both[0])
-    assert alone.shape == (48,)
-    plain = tasks.make("TwoRobotPickCube-v1").single_observation_space.shape[0]
-    parallel.reset(seed=0)
-    assert parallel.state().shape == (plain + 6,)
-    for interface in (env, vec, parallel):
-        interface.close()
 
 
 WRONG = [

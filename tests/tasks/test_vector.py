@@ -107,22 +107,6 @@ def test_workers_change_nothing(mode):
         assert env.metadata["autoreset_mode"] is mode
 
 
-def test_an_ended_episode_waits_for_its_reset():
-    """The step in which an environment begins anew moves nothing in it."""
-    env = make("TwoRobotPickCube-v1", num_envs=2)
-    task = tasks.make("TwoRobotPickCube-v1", num_envs=2)
-    env.reset(seed=0)
-    task.reset(seed=0)
-    action = np.full((2, 16), 0.3, np.float32)
-    for _ in range(100):
-        env.step(action)
-        task.step(action)
-    obs, reward, terminated, truncated, info = env.step(action)
-    np.testing.assert_array_equal(obs, task.reset()[0].numpy())
-    assert [x.any() for x in (reward, terminated, truncated)] == [False] * 3
-    assert info["elapsed_steps"].tolist() == [0, 0]
-
-
 def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
     env = make()
     simulation = env._backend.batches[0]._task.simulation
@@ -184,15 +168,6 @@ def test_seeds():
         env.reset(seed=-1)
 
 
-def test_what_it_returns_stays_as_it_is():
-    env = make()
-    obs, info = env.reset(seed=0)
-    before = obs.copy(), info["elapsed_steps"].copy()
-    env.step(np.ones((3, 8), np.float32))
-    np.testing.assert_array_equal(obs, before[0])
-    np.testing.assert_array_equal(info["elapsed_steps"], before[1])
-
-
 def test_an_action_is_checked_once():
     env = VectorTask("PickCube-v1", num_envs=2, num_workers=0)
     checked = env._backend.batches[0]._task._reader.checked
@@ -248,16 +223,3 @@ def test_what_cannot_be_made(fields, message):
 def test_wrong_reset_options(options, message):
     with pytest.raises(TaskError, match=message):
         make().reset(options=options)
-
-
-@pytest.mark.long
-def test_pictures():
-    from robot_layouts.simulation.rendering import vulkan_problem
-
-    if problem := vulkan_problem():
-        pytest.skip(problem)
-    with closing(make(num_envs=2, num_workers=2, render_mode="rgb_array", timeout=None)) as env:
-        env.reset(seed=0)
-        pictures = env.render()
-    assert [p.shape for p in pictures] == [(512, 512, 3)] * 2
-    assert (pictures[0] != pictures[1]).any()

@@ -114,24 +114,6 @@ def test_real_ones_bear_a_cube_and_others_do_not() -> None:
     assert fall("visual") == pytest.approx(0.02, abs=1e-3)
 
 
-def test_dynamic_ones_are_moved_and_static_ones_stand_fast() -> None:
-    def pushed(kind: Any) -> float:
-        env = made(Distractors(count=Whole(1, 1), kind=kind, x=0.1, y=0.25))
-        env.reset(seed=0)
-        before = env.simulation.read().position("distractor_0")[0].copy()
-        state = env.get_state_dict()
-        cube = state["actors"]["cube"]
-        cube[0, :3] = torch.tensor([before[0] - 0.08, before[1], 0.02])
-        cube[0, 7:10] = torch.tensor([3.0, 0.0, 0.0])
-        env.set_state_dict(state)
-        for _ in range(10):
-            env.step(np.zeros((1, 8), np.float32))
-        return float(np.linalg.norm(env.simulation.read().position("distractor_0")[0] - before))
-
-    assert pushed("dynamic") > 0.005
-    assert pushed("static") == 0.0
-
-
 def test_those_that_are_seen_alone_change_no_state() -> None:
     def played(distractors: Distractors | None) -> list[torch.Tensor]:
         env = made(distractors)

@@ -190,11 +190,6 @@ def test_columns_of_datasets_take_no_noise() -> None:
         tasks.make("PickCube-v1", randomization=noise, obs_mode="lerobot")
 
 
-def test_a_task_shows_what_varies() -> None:
-    assert "varies       mass" in repr(tasks.make("PickCube-v1", randomization=MASS))
-    assert "varies" not in repr(tasks.make("PickCube-v1", randomization=Randomization()))
-
-
 def test_a_task_may_draw_noise_when_it_observes() -> None:
     """It is a function of the episode, the step and the name, whatever was done before."""
     env, other = tasks.make("PickCube-v1", 2), tasks.make("PickCube-v1")
