@@ -110,10 +110,6 @@ class TestCover:
             held = self.pairs(*cover(pairs - given, given))
             assert pairs - given <= held <= pairs
 
-    def test_links_that_are_excused_anyhow_join_a_set(self):
-        pairs, given = self.pairs("ac", "bc", "ad"), self.pairs("ab", "cd", "bd")
-        assert cover(pairs, given) == [set("abcd")]
-
 
 def test_links_stand_still_that_the_guess_lets_overlap(tmp_path):
     """The second post reaches into the fourth, and the first one into the third."""

@@ -90,20 +90,6 @@ def test_it_is_smooth_and_faces_outwards(made_here, tmp_path):
         assert ((mesh.vertex_normals * outwards).sum(1) > 0.8).all()
 
 
-@pytest.mark.long
-def test_a_hole_is_not_closed_nor_a_small_piece_lost(made_here, tmp_path):
-    tube = trimesh.creation.annulus(0.004, 0.006, 0.1, sections=400)
-    speck = trimesh.creation.icosphere(4, 0.002)
-    speck.apply_translation([0.05, 0, 0])
-    whole = trimesh.util.concatenate([tube, speck])
-    whole.export(tmp_path / "tube.ply")
-    (part,) = light_meshes.light_parts(str(tmp_path / "tube.ply"), (1.0, 1.0, 1.0))
-    now = trimesh.load_mesh(part.file, process=False)
-    assert len(now.faces) < len(whole.faces) / 2
-    assert farthest(now, whole) < 1e-3
-    assert farthest(whole, now) < 1e-3
-
-
 def test_few_triangles_and_textures_stay(made_here, tmp_path):
     box = trimesh.creation.box((0.1, 0.1, 0.1))
     box.export(tmp_path / "box.ply")

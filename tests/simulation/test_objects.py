@@ -106,24 +106,6 @@ def pair(*, visuals=False):
     return Simulation(single({"arm": "panda"}), build, 1, visuals=visuals)
 
 
-def test_the_hull_of_a_boxes_corners_is_that_box():
-    simulation = pair()
-    box, hull = (simulation.backend.worlds[0].bodies[name].component for name in ("box", "hull"))
-    assert hull.mass == pytest.approx(box.mass)
-    assert np.allclose(hull.inertia, box.inertia, rtol=1e-5)
-    assert np.allclose(hull.cmass_local_pose.p, (0.03, 0.0, 0.02), atol=1e-6)
-    (one,), (other,) = box.collision_shapes, hull.collision_shapes
-    assert np.allclose(other.local_pose.p, one.local_pose.p)
-    assert np.allclose(other.local_pose.q, one.local_pose.q)
-    assert other.collision_groups == one.collision_groups
-    assert other.density == one.density
-    materials = [
-        (m.static_friction, m.dynamic_friction, m.restitution)
-        for m in (one.physical_material, other.physical_material)
-    ]
-    assert materials[0] == materials[1] == pytest.approx((0.9, 0.8, 0.1))
-
-
 def test_things_stand_still_for_ten_seconds():
     seen = try_rests(ObjectRegistry.load(name) for name in CATALOGUE)
     assert [trial.problem for trial in seen if trial.problem] == []

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
-from layouts.frames import Pose
 from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
 from robot_layouts.simulation.sapien3.world import BuiltWorld
@@ -118,22 +117,6 @@ def test_what_cannot_be_reached_has_no_answer():
     follower = TreeFollower(RobotRegistry.load("panda"), "panda_hand_tcp", None, tree.joints)
     assert follower.follow((9.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), start) is None
     assert follower.follow((np.nan, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), start) is None
-
-
-def test_each_start_has_an_answer_of_its_own():
-    tree, start = arms_of("panda")[1], start_of("panda")
-    pose = tree.tcp_pose(moved(tree, start))
-    starts = np.array([start, start + 0.1, start - 0.1])
-    alone = [tree.descend(*pose, row[None])[0] for row in starts]
-    np.testing.assert_allclose(tree.descend(*pose, starts), alone, atol=1e-9)
-
-
-def test_a_base_may_stand_elsewhere_than_in_the_layout():
-    layout, start = world_of("panda").layout, start_of("panda")
-    tree = TreeArm(layout, "arm", Pose((1.0, 2.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
-    other = TreeArm(Layout({"arm": Placement("panda", (1.0, 2.0, 0.0), (1, 0, 0, 0))}), "arm")
-    for one, same in zip(tree.tcp_pose(start[:7]), other.tcp_pose(start[:7]), strict=True):
-        np.testing.assert_array_equal(one, same)
 
 
 def test_a_follower_names_what_it_cannot_follow():

@@ -98,16 +98,6 @@ def test_lengths_that_are_taken_together_are_those_of_single_rows(env: TaskEnv):
         state = state_of(env)
 
 
-def test_distances_outlast_the_speeds_that_are_asked_for_with_them(env: TaskEnv):
-    state_of(env).speed("cube")
-    unread = state_of(env)
-    away = state_of(env).distance("cube", "goal_site").tolist()
-    env.step(torch.zeros(2, 15))
-    assert unread.distance("cube", "goal_site").tolist() == away
-    with pytest.raises(SimulationError, match="no longer the present one"):
-        unread.speed("cube")
-
-
 def test_a_remembered_answer_is_that_of_the_same_question(env: TaskEnv):
     env.step(torch.ones(2, 15))
     state = state_of(env)

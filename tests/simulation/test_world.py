@@ -5,10 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from layouts import face_to_face, side_by_side, single
+from layouts import side_by_side, single
 from objects.shapes import Capsule, Cylinder
 from robot_layouts.simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
-from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.blueprint import read_blueprint
 from robot_layouts.simulation.sapien3.world import BuiltWorld
@@ -104,19 +103,6 @@ def test_a_robot_without_fingers_never_grasps():
         simulation.read().finger_gap("arm")
 
 
-def test_targets_follow_the_action_split():
-    layout = face_to_face({"left": "panda", "right": "panda_stick"}, spacing=1.5)
-    controller = JointPositionController(layout)
-    qpos = np.arange(16, dtype=np.float32)[None]
-    action = np.zeros((1, 15), np.float32)
-    action[0, 0], action[0, 7], action[0, 8] = 1.0, -5.0, 0.5
-    targets = controller.targets(action, qpos)[0]
-    assert targets[0] == np.float32(0.1)
-    assert targets[7] == targets[8] == pytest.approx(-0.01, abs=1e-8), "both fingers, clipped"
-    assert targets[9] == np.float32(9) + np.float32(0.05)
-    assert np.array_equal(targets[10:], qpos[0, 10:])
-
-
 def test_a_descriptor_that_contradicts_its_urdf_is_refused():
     panda = RobotRegistry.load("panda")
     arm = panda.action_split.groups["arm"]
@@ -194,36 +180,3 @@ def test_anchored_bodies_return_and_velocities_vanish():
     assert state.position("table-workspace")[0] == pytest.approx([-0.12, 0, -0.9196429])
     assert not state.linear_velocity("cube").any()
     assert not state.qvel("arm").any()
-
-
-def controlled(**changes) -> tuple[Simulation, JointPositionController]:
-    """Make a Panda whose gripper's group is changed, and its controller."""
-    panda = RobotRegistry.load("panda")
-    gripper = dataclasses.replace(panda.action_split.groups["gripper"], **changes)
-    split = panda.action_split.replace(gripper=gripper)
-    layout = single({"arm": dataclasses.replace(panda, action_split=split)})
-    simulation = Simulation(layout, lambda world, _: None, 2, PhysicsSettings())
-    stand(simulation)
-    return simulation, JointPositionController(layout)
-
-
-def targets(simulation: Simulation, controller: JointPositionController, number: float):
-    action = np.full((2, controller.action_dim), number, np.float32)
-    return controller.targets(action, simulation.read().joint_positions)[:, 7:]
-
-
-def test_mimic_joints_follow_with_their_multipliers_and_offsets():
-    simulation, controller = controlled(multipliers=(1.0, -0.5), offsets=(0.0, 0.02))
-    np.testing.assert_allclose(targets(simulation, controller, 1.0), [[0.04, 0.0]] * 2, atol=1e-7)
-    np.testing.assert_allclose(
-        targets(simulation, controller, -1.0), [[-0.01, 0.025]] * 2, atol=1e-7
-    )
-
-
-def test_a_held_group_stays_where_the_layout_starts_it_whatever_the_action():
-    simulation, controller = controlled(held=True)
-    assert controller.action_dim == 7
-    for number in (-1.0, 1.0):
-        np.testing.assert_allclose(
-            targets(simulation, controller, number), [[0.04, 0.04]] * 2, atol=1e-7
-        )
