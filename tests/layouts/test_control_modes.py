@@ -115,16 +115,6 @@ def test_so_do_limbs():
     assert both.control_mode() == POSE
 
 
-def test_a_task_of_it_tells_it():
-    cell = PAIR.in_control_mode({"left": POSE})
-    with closing(tasks.make("TwoRobotPickCube-v1", layout=cell, obs_mode="none")) as task:
-        assert task.control_mode == {"left": POSE}
-        again = tasks.make("TwoRobotPickCube-v1", layout=task.layout, obs_mode="none")
-    with closing(again):
-        assert again.control_mode == {"left": POSE}
-        assert again.layout == task.layout
-
-
 def test_what_was_changed_since_is_refused():
     panda = RobotRegistry.load("panda").in_control_mode(POSE)
     arm = replace(panda.action_split.groups["arm"], damping=3.0)

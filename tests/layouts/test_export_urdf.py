@@ -74,16 +74,6 @@ def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
             np.testing.assert_allclose(found, pose, rtol=0, atol=1e-9)
 
 
-def test_there_is_one_tree_whose_names_are_distinct(cell, merged):
-    root = ElementTree.parse(merged).getroot()
-    assert root.get("name") == "cell"
-    for kind in ("link", "joint"):
-        names = [element.get("name") for element in root.iterfind(kind)]
-        assert len(set(names)) == len(names) > 40
-        assert {name.partition("/")[0] for name in names} - {"world"} == set(cell)
-    assert len(root.findall("link")) == len(root.findall("joint")) + 1
-
-
 def test_every_mesh_can_be_loaded(merged):
     urdf = yourdfpy.URDF.load(
         str(merged), load_collision_meshes=True, build_collision_scene_graph=True

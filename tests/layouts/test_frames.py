@@ -64,17 +64,6 @@ class TestWhereThingsAre:
         assert layout["second"].base_position == pytest.approx(second, abs=1e-9)
         assert same_turn(layout["second"].base_quaternion, turn)
 
-    def test_the_order_of_declaration_does_not_matter(self):
-        placements = {
-            "last": Placement("panda", (0.0, 0.0, 1.0), on="middle"),
-            "middle": Placement("panda", (0.0, 1.0, 0.0), on="b"),
-        }
-        frames = {"b": Frame((1.0, 0.0, 0.0), on="a"), "a": Frame((1.0, 0.0, 0.0))}
-        layout = Layout(placements, frames)
-        assert layout["last"].base_position == (2.0, 1.0, 1.0)
-        assert layout == Layout(placements, dict(reversed(frames.items())))
-        assert layout.frame_poses["b"] == Pose((2.0, 0.0, 0.0))
-
     def test_what_is_left_out_is_the_frames_origin_and_the_robots_own_turn(self):
         layout = Layout({"arm": Placement("so100", on="here")}, {"here": Frame((1.0, 2.0, 3.0))})
         assert layout["arm"].base_position == (1.0, 2.0, 3.0)

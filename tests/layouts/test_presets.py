@@ -197,16 +197,6 @@ class TestAutomaticDistances:
         assert layout == ring({f"arm_{i}": "panda" for i in range(count)}, radius=radius)
 
     @given(sized)
-    def test_in_a_grid_nobody_reaches_a_neighbours_base(self, robots):
-        layout = grid(robots, spacing="auto", columns=2)
-        names = list(layout)
-        pairs = [*zip(names[::2], names[1::2], strict=False), *zip(names, names[2:], strict=False)]
-        if pairs:
-            most = max(apart(layout, *pair) for pair in pairs)
-            lengths = [distance(layout, *pair) for pair in pairs]
-            assert lengths == pytest.approx([most] * len(pairs))
-
-    @given(sized)
     def test_across_a_table_every_pair_can_hand_over(self, robots):
         names = list(robots)[:4]
         layout = around_table({name: robots[name] for name in names})
@@ -346,11 +336,6 @@ class TestGrid:
             assert y - places[0][1] == pytest.approx(column * spacing)
         assert places[0][1] == pytest.approx(-(per_row - 1) / 2 * spacing)
 
-    def test_left_out_columns_make_it_square(self):
-        layout = grid({f"arm_{i}": "panda" for i in range(9)}, spacing=1.0)
-        places = {placement.base_position[:2] for placement in layout.values()}
-        assert places == {(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)}
-
     @pytest.mark.parametrize("columns", [0, -1, 1.5, "2", True])
     def test_columns_that_are_no_count(self, columns):
         with pytest.raises(LayoutError, match="columns is .*; it must be an integer of 1 or more"):
@@ -375,9 +360,3 @@ def test_robots_that_are_no_mapping(preset):
     for robots in (None, ["panda", "panda"], "panda", 2):
         with pytest.raises(LayoutError, match="robots is .*; it takes a mapping .*'left': 'panda'"):
             PRESETS[preset](robots, **spacing)
-
-
-@pytest.mark.parametrize("options", [{"edges": 5}, {"edges": ["north", 5]}, {"table": 5}])
-def test_tables_that_are_none(options):
-    with pytest.raises((LayoutError, UnknownNameError), match="edge|width and depth"):
-        around_table({"a": "panda", "b": "panda"}, **options)

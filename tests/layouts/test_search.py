@@ -10,7 +10,6 @@ import layouts
 from layouts import ceiling, ring, search, table, wall
 from layouts.__main__ import main
 from layouts.layout import Layout
-from layouts.placing.bases import ground_of
 from layouts.placing.cost import requirements_of
 from robots import LayoutError, MissingPackageError, RobotLayoutsError, RobotRegistry
 from tests.layouts.small_robots import robot
@@ -167,18 +166,6 @@ class TestGround:
         assert -1.0 <= y <= 1.0
         assert z == 0.2
         assert reached(layout, CUBE)
-
-    @pytest.mark.parametrize(
-        ("around", "within"),
-        [(None, None), (None, (0, 0, 1, 1)), (table(1, 0.5), None), ((0, 0, 1, 1), None)],
-    )
-    def test_the_grid_lies_where_bases_may_stand(self, around, within):
-        robots = {"arm": RobotRegistry.load("panda")}
-        ground = ground_of(around, within, 0.0, robots, [(0.0, 0.0, 0.1)])
-        bases = ground.grid()
-        assert 100 < len(bases) < 2500
-        assert len(set(bases)) == len(bases)
-        assert all(ground.surfaces[base.surface].allows(base.x, base.y) for base in bases)
 
     def test_frames_and_robots_may_not_share_a_name(self):
         with pytest.raises(LayoutError, match="'table' names both a robot and a frame"):

@@ -150,22 +150,6 @@ class TestDistances:
         assert between.links == ("base", "base")
         assert between.distance == pytest.approx(0.115, abs=1e-9)
 
-    def test_one_above_the_other_is_moved_the_shorter_way(self, tmp_path):
-        """Their boxes are 10 cm wide, and 10 cm and 40 cm high; they overlap by 5 cm in height."""
-        arm = turntable(tmp_path)
-        layout = Layout({"one": Placement(arm), "other": Placement(arm, (0.01, 0.0, 0.35))})
-        (finding,) = layout.validate(samples=0, workspaces=False).findings
-        assert "0.070 m farther apart vertically (0.420 m between" in finding.advice
-
-    def test_turned_boxes_are_moved_no_farther_than_they_need(self, tmp_path):
-        """Their sides face each other, though not along the world's axes."""
-        arm, half = turntable(tmp_path), 0.5**0.5
-        corner = {"one": 0.0, "other": 0.095 * half}
-        turned = yaw_quaternion(math.pi / 4)
-        placements = {n: Placement(arm, (x, x, 0), turned) for n, x in corner.items()}
-        (finding,) = Layout(placements).validate(samples=0, workspaces=False).findings
-        assert "0.030 m farther apart (0.125 m between" in finding.advice
-
     @pytest.mark.parametrize("seed", range(6))
     def test_the_nearest_links_are_the_nearest_of_all(self, seed):
         """Compared with FCL's answer for every pair of hulls, in random postures."""
@@ -197,23 +181,6 @@ class TestDistances:
         ]
         assert nearest(*bodies).distance == pytest.approx(min(distances), abs=1e-9)
         assert len(touching(*bodies)) == sum(distance < 0 for distance in distances)
-
-    def test_a_mesh_counts_as_its_convex_hull(self, tmp_path):
-        import trimesh
-
-        sides = [trimesh.creation.box(bounds=b) for b in ([[0, 0, 0], [1, 0.1, 0.1]],)]
-        sides.append(trimesh.creation.box(bounds=[[0, 0, 0], [0.1, 1, 0.1]]))
-        trimesh.util.concatenate(sides).export(tmp_path / "corner.stl")
-        shape = '<mesh filename="corner.stl" scale="0.1 0.1 0.1"/>'
-        text = urdf(link("base", shape), link("top", ""), joint("turn", "base", "top"))
-        arm = robot(tmp_path, text, ["turn"])
-        placements = {
-            "one": Placement(arm, (0, 0, 0), (1, 0, 0, 0)),
-            "other": Placement(arm, (0.2, 0.2, 0), yaw_quaternion(math.pi)),
-        }
-        (between,) = Layout(placements).validate(workspaces=False).clearances
-        # The L's own distance would be larger: its hull is cut off by the line from tip to tip.
-        assert between.distance == pytest.approx((0.2 - 0.11) * math.sqrt(2), abs=1e-5)
 
     @pytest.mark.parametrize("shape", ['<cylinder radius="0.05" length="0.1"/>'])
     def test_round_shapes_are_nearly_round(self, shape, tmp_path):
@@ -451,11 +418,6 @@ class TestDraws:
     def test_a_number_of_draws_that_is_none(self, samples):
         with pytest.raises(LayoutError, match="samples is .* it must be an integer of 0 or more"):
             side_by_side(PANDAS, spacing=0.3).validate(samples=samples)
-
-    def test_a_long_check_tells_how_far_it_is(self, monkeypatch, capsys):
-        monkeypatch.setattr("robot_layouts.core.progress.PATIENCE", 0.0)
-        side_by_side(PANDAS, spacing=0.3).validate()
-        assert "checking the layout: left with right\n" in capsys.readouterr().err
 
 
 class TestPicture:

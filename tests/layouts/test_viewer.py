@@ -15,8 +15,8 @@ from layouts.__main__ import main
 from layouts.viewer import ShownCell, ShownMotion, Thing, ViewerError
 from layouts.viewer.page import NO_SLIDERS, CellPage, contacts_text, save_html
 from layouts.viewer.server import serving
-from layouts.visuals import MOST_TRIANGLES, coloured, read_visuals, simplified
-from robots import LayoutError, MissingPackageError, RobotRegistry
+from layouts.visuals import MOST_TRIANGLES, coloured, simplified
+from robots import LayoutError, MissingPackageError
 from tests.layouts.cells import link_poses, mixed_cell, random_positions
 
 ARM = ("single", "arm=so100")
@@ -202,15 +202,6 @@ def test_a_saved_page_is_whole_or_not_there(tmp_path):
     with pytest.raises(ViewerError, match="must end in .html"):
         save_html(cell, tmp_path / "arm.txt")
     assert [p.name for p in tmp_path.iterdir()] == ["deep"]
-
-
-def test_visuals_have_the_colours_of_their_files():
-    so100 = read_visuals(RobotRegistry.load("so100").urdf.locate(pictures=True))
-    colours = {part.rgba for parts in so100.values() for part in parts}
-    assert (0.05, 0.05, 0.05, 1.0) in colours
-    panda = read_visuals(RobotRegistry.load("panda").urdf.locate(pictures=True))
-    assert len({part.rgba for parts in panda.values() for part in parts}) > 1
-    assert len(panda["panda_hand"]) == 2
 
 
 def test_no_mesh_is_drawn_of_more_triangles_than_other_programs_read():
