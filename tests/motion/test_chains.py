@@ -37,13 +37,3 @@ def test_parts_of_several_robots_are_there_at_once():
     cell = Cell(mixed_cell())
     qpos, _ = cells.states(cell, 5)
     assert max(differences(cell, LinkPoses(cell, range(len(cell.parts))), qpos).values()) < 1e-12
-
-
-def test_only_what_is_asked_for_and_what_carries_it_is_computed():
-    cell = Cell(mixed_cell())
-    qpos, _ = cells.states(cell, 3)
-    wanted = next(i for i, part in enumerate(cell.parts) if part.robot == "up" and part.parent > 0)
-    link_poses = LinkPoses(cell, [wanted])
-    assert list(link_poses.rows) == [0, cell.parts[wanted].parent, wanted]
-    assert max(differences(cell, link_poses, qpos).values()) < 1e-12
-    assert LinkPoses(cell, []).places(qpos).shape == (1, 3, 4, 4)

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from layouts import Layout, Placement, face_to_face
-from layouts.validation.collisions import FAR
+from layouts import Layout, Placement
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.travel import TravelBounds
 from robot_layouts.motion.model.bodies import WORLD
@@ -96,24 +95,6 @@ def test_an_overlap_has_a_depth():
     assert contact.names[1] == "lid"
     assert contact.distance == pytest.approx(-0.01, abs=1e-6)
     assert str(contact) == f"{contact.names[0]} and lid overlap by 1.0 cm"
-
-
-def test_own_links_keep_their_own_distance(crowd):
-    own = {"own": 0.05, "moving": ["left"]}
-    apart = crowd.checker(clearance=0.2, **own)
-    movers = [[crowd.solids[i].mover for i in pair] for pair in apart.pairs.tolist()]
-    assert {d for (a, b), d in zip(movers, apart.apart.tolist(), strict=True) if a == b} == {0.05}
-    assert {d for (a, b), d in zip(movers, apart.apart.tolist(), strict=True) if a != b} == {0.2}
-    none = crowd.checker(own=None)
-    assert all(crowd.solids[a].mover != crowd.solids[b].mover for a, b in none.pairs.tolist())
-
-
-def test_nothing_within_reach_is_far():
-    cell = Cell(face_to_face({"one": "panda", "other": "panda"}, spacing=30.0))
-    checker = cell.checker(own=None)
-    assert checker.distance(cell.start[None]).tolist() == [FAR]
-    assert checker.nearest(cell.start) is None
-    assert checker.contact(cell.start) is None
 
 
 # -- which pairs count -----------------------------------------------------------------------
@@ -236,15 +217,6 @@ def test_what_slides_out_travels_farther_when_it_is_turned(tmp_path):
         ends = np.array([[0.0, out], [1.0, out]])
         assert least <= TravelBounds(cell).steps(*ends, (0.001, 10.0)) / 1000 <= least + 0.1
         assert least <= TravelBounds(cell).between(*ends)[WORLD].max() <= least + 0.1
-
-
-def test_what_moves_both_of_two_links_brings_them_no_nearer(crowd):
-    turned = crowd.start.copy()
-    turned[crowd.slices["left"].start] += 0.5
-    between = TravelBounds(crowd).between(crowd.start, turned)
-    own = [i for i, part in enumerate(crowd.parts) if part.robot == "left"]
-    assert (between[np.ix_(own, own)] == 0.0).all()
-    assert (between[own[0], WORLD], between[WORLD, own[-1]]) > (0.0, 0.3)
 
 
 def test_nothing_in_the_way_is_missed(tmp_path):

@@ -34,16 +34,6 @@ def test_a_rounded_path_has_continuous_slopes_and_bends():
     assert np.allclose(places[[0, -1]], POINTS[[0, -1]], atol=1e-12)
 
 
-def test_a_blend_stays_within_its_corner():
-    rounded = path()
-    near = np.linspace(rounded.corners[1] - 0.4, rounded.corners[1] + 0.4, 101)
-    before, corner, behind = rounded.at(near[[0]])[0], POINTS[1], rounded.at(near[[-1]])[0]
-    sides = np.stack([before - corner, behind - corner], axis=1)
-    shares = np.linalg.lstsq(sides, (rounded.at(near) - corner).T, rcond=None)[0]
-    assert (shares > -1e-9).all()
-    assert (shares.sum(axis=0) < 1 + 1e-9).all()
-
-
 def test_points_on_a_line_are_left_out():
     points = np.array([[0.0, 0, 0], [0.5, 0.5, 0], [0.5, 0.5, 0], *POINTS[1:]])
     assert np.allclose(without_straight_points(points, SPEEDS), POINTS)
