@@ -169,22 +169,6 @@ def test_a_report_is_read_as_it_was_written(tmp_path):
         summary(report)
 
 
-def test_what_is_measured_later_says_on_what_it_was(tmp_path):
-    later = replace(report_of(replace(NAMES, unit="s")), load=(3.0, 9.0))
-    both = report_of(NUMBERS, NAMES).with_those_of(later, ("names", "more", "numbers"))
-    assert both.measurements == (replace(NAMES, unit="s", conditions=later.conditions()), NUMBERS)
-    assert "load average 3.0 to 9.0" in both.page()
-    both.write(tmp_path)
-    assert read_report(tmp_path / "bench.json") == both
-
-
-@pytest.mark.parametrize("text", ["", "{}", "[]", '{"measurements": [3]}'])
-def test_something_else_is_refused(tmp_path, text):
-    (tmp_path / "bench.json").write_text(text)
-    with pytest.raises(BenchmarkError, match=r"cannot read .*bench\.json"):
-        read_report(tmp_path / "bench.json")
-
-
 def test_the_record_is_whole():
     record = read_report()
     assert not record.left_out

@@ -2,20 +2,15 @@
 
 import json
 
-import numpy as np
 import pytest
 
 from benchmarks import planning
 from benchmarks.__main__ import main
 from benchmarks.planning import (
     ALONE,
-    Place,
     table_of,
 )
-from layouts import face_to_face
-from robot_layouts.motion import Motion
 
-LEANING = np.array([0, 0.9, 0, 0.6, 0, 0, 0, 0, 0])  # rad; of a Panda, from its start
 LINE = {
     "cell": 0,
     "query": 0,
@@ -27,23 +22,6 @@ LINE = {
 SOLVED = {"solved": True, "certified": True, "collisions": 0, "clearance": 0.0123}
 EXECUTED = {"executed": True, "touching": [], "stray": 0.0021, "late": 0.0}
 REFUSED = {"solved": False, "seconds": 0.1, "message": ""}
-
-
-def test_a_motion_on_which_robots_meet_is_seen_to_touch(monkeypatch):
-    layout = face_to_face({"left": "panda", "right": "panda"}, spacing=1.35)
-    monkeypatch.setattr(planning, "random_cell", lambda *_: layout)
-    place = Place(0, 2, ())
-    ahead = {name: p.start_qpos + LEANING for name, p in layout.items()}
-    times, share = np.array([0.0, 1.0]), np.array([0.0, 1.0])[:, None]
-    meeting = {n: p.start_qpos + share * (ahead[n] - p.start_qpos) for n, p in layout.items()}
-    still = {n: np.zeros((2, p.robot.dof)) for n, p in layout.items()}
-    seen = place.carry_out(Motion(layout, times, meeting, still))
-    assert {"left", "right"} == {part.split(".")[0] for part in seen["touching"][0].split(", ")}
-    begun = {n: np.tile(p.start_qpos, (2, 1)) for n, p in layout.items()}
-    seen = place.carry_out(Motion(layout, times, begun, still))
-    assert (seen["executed"], seen["touching"]) == (True, [])
-    assert seen["stray"] < 0.01
-    place.task.close()
 
 
 @pytest.mark.long

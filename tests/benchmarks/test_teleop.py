@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks import teleop
 from benchmarks.__main__ import main
-from layouts.viewer.server import ViewerError
 from robots import MissingPackageError
 
 
@@ -32,15 +31,6 @@ def test_what_the_page_measures_is_what_is_said(tmp_path, capsys):
     assert abs(np.subtract([median, most], [*map(int, latency.groups())])).max() <= 1
     assert code == int(seen["median"] > 150)
     assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.long
-def test_a_command_without_a_page_says_why():
-    with (
-        pytest.raises(ViewerError, match=r"teleop NoTask-v1` serves no page: .*NoTask-v1"),
-        teleop.served("robot_layouts", "teleop", "NoTask-v1"),
-    ):
-        pass
 
 
 def test_an_installation_without_playwright_says_what_to_install(monkeypatch):
