@@ -1,7 +1,6 @@
 """The example that learns from what cameras see."""
 
 import json
-import pickle
 from contextlib import closing
 
 import pytest
@@ -11,7 +10,7 @@ pytest.importorskip("matplotlib")
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.data import evaluate, record
+from robot_layouts.data import record
 from robot_layouts.data.reading.recording import Recording
 from robots import TaskError
 from tests.examples.learning import examples, finish, start
@@ -111,11 +110,3 @@ def test_it_is_not_told_where_objects_are(example, learned):
     assert torch.equal(senses(observation), before)
     observation["agent"]["qpos"] += 1
     assert not torch.equal(senses(observation), before)
-
-
-def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
-    policy = example.SeeingPolicy.load(learned / "policy.pt")
-    alone = evaluate(policy, TASK, range(50, 52), workers=0, **policy.making)
-    copy = pickle.loads(pickle.dumps(policy))
-    beside = evaluate(copy, TASK, range(50, 52), workers=0, num_envs=2, **policy.making)
-    assert alone.scores == beside.scores

@@ -2,11 +2,6 @@
 
 import json
 import pickle
-import sys
-from contextlib import closing
-from dataclasses import replace
-from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -82,22 +77,6 @@ def test_a_killed_run_and_another_have_the_same_weights(ppo, tmp_path):
     assert_same(last(tmp_path / "killed"), last(tmp_path / "whole"))
 
 
-def test_every_checkpoint_has_worlds_of_its_own(ppo, tmp_path):
-    words = [*WORDS, "--task", "PushCube-v1", "--workers", "0", "--seed", "3"]
-    options = ppo.read_arguments("", "", words)
-    recipe = replace(ppo.RECIPES["PushCube-v1"], every=1)
-    with closing(ppo.PPOLearner(recipe, options)) as learner:
-        folders = [tmp_path / str(number) for number in range(3)]
-        for folder in folders:
-            folder.mkdir()
-        learner.begin(folders[0])
-        seeds = []
-        for number, (before, after) in enumerate(pairwise(folders)):
-            learner.learn(before, after, number, lambda _: None)
-            seeds += [info["seed"] for info in learner._env.reset_infos]
-    assert seeds == [10_300_000, 10_300_001, 10_300_002, 10_300_003]
-
-
 def test_a_run_goes_on_only_as_it_began(ppo, tmp_path, capsys):
     ppo.run([*WORDS, "--steps", "200", "--workers", "0", "--out", str(tmp_path)])
     assert ppo.run([*WORDS, "--workers", "0", "--out", str(tmp_path)]) == 1
@@ -122,19 +101,3 @@ def test_what_was_learned_is_a_policy_by_name(ppo, tmp_path, monkeypatch):
         obs, reward, _, _, _ = env.step(policy(obs)[None])
         total += reward.item()
     assert scores[5].total == pytest.approx(total)
-
-
-@pytest.mark.long
-def test_it_learns(tmp_path):
-    words = ["--task", "PushCube-v1", "--steps", "40000", "--workers", "2"]
-    finish(start("ppo_two_arms", tmp_path, *words))
-    curve = json.loads((tmp_path / "curve.json").read_text())
-    assert curve[-1]["reward"] > 1.5 * curve[0]["reward"]
-
-
-def test_a_task_of_the_present_folder_can_be_imported(ppo, tmp_path, monkeypatch):
-    (tmp_path / "my_task.py").write_text("")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    assert ppo.read_arguments("", "", ["--task", "my_task:Tray-v1"]).task == "my_task:Tray-v1"
-    assert find_spec("my_task")
