@@ -1,5 +1,8 @@
 """What tests of this project's own tasks share: bodies put where success is told from."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import torch
 
 import tasks
@@ -24,6 +27,20 @@ def put(env: TaskEnv, **poses: tuple[float, ...]) -> dict[str, torch.Tensor]:
         state["actors"][body] = row
     env.set_state_dict(state)
     return look(env)
+
+
+def told(env: TaskEnv, flags: str, scenes: Iterable[dict[str, Any]]) -> list[list[bool]]:
+    """Put bodies at poses, or their joints, and return what flags say of each scene."""
+    world, found = env.simulation.worlds[0], []
+    for scene in scenes:
+        for body, place in scene.items():
+            if isinstance(place, dict):
+                world.set_joints(body, **place)
+            else:
+                world.set_pose(body, place[:3], place[3:] or UPRIGHT)
+        info = look(env)
+        found.append([info[flag].item() for flag in flags.split()])
+    return found
 
 
 def look(env: TaskEnv) -> dict[str, torch.Tensor]:

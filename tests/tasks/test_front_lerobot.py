@@ -118,19 +118,6 @@ def test_success_is_told_when_the_episode_ends_and_from_then_on(played, plan):
     assert np.delete(truncated, SOLVED, 1)[-1].all()
 
 
-def test_what_is_over_earns_nothing_more(played):
-    ended = np.array([step[2] | step[3] for step in played])
-    rewards = np.array([step[1] for step in played])
-    assert not rewards[1:][ended[:-1]].any()
-    assert rewards[ended & ~np.roll(ended, 1, 0)][0] > 0  # the last step itself counts
-
-
-def test_a_reset_begins_anew(env, played):
-    env.reset(seed=SEEDS, options=THEIRS)
-    *_, terminated, truncated, info = env.step(np.zeros((3, 16), np.float32))
-    assert not (terminated | truncated | info["is_success"]).any()
-
-
 def test_only_what_is_reset_begins_anew(env, plan):
     env.reset(seed=SEEDS)
     *_, (_, _, terminated, _, _) = steps(env, plan)

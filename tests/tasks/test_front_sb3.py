@@ -25,8 +25,6 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import NatureCNN
 from stable_baselines3.common.vec_env import (
     DummyVecEnv,
-    VecCheckNan,
-    VecFrameStack,
     VecMonitor,
     VecNormalize,
 )
@@ -77,36 +75,6 @@ def test_it_says_what_their_own_vector_says(actions):
     assert ends(ours, 0) == [49]
 
 
-def test_an_episode_that_succeeds(actions):
-    said = play(make(), actions)
-    step, *_ = ends(said, SOLVED)
-    obs, reward, done, infos, reset_infos = said[2 + step]
-    assert done.tolist() == [False, True, False]
-    assert reward[SOLVED] == 1.0
-    assert infos[SOLVED]["TimeLimit.truncated"] is False
-    assert infos[SOLVED]["is_success"] is infos[SOLVED]["success"] is True
-    assert infos[SOLVED]["elapsed_steps"] == step + 1
-    assert reset_infos[SOLVED]["elapsed_steps"] == 0
-    assert [new is old for new, old in zip(reset_infos, said[1], strict=True)] == [1, 0, 1]
-    assert not np.array_equal(infos[SOLVED]["terminal_observation"], obs[SOLVED])
-    assert "terminal_observation" not in infos[0]
-
-
-def test_an_episode_whose_time_is_up(actions):
-    env, task = make(), tasks.make(TASK, num_envs=NUM_ENVS)
-    env.seed(SEED)
-    env.reset()
-    task.reset(seed=SEED)
-    for _ in range(50):
-        obs, _, done, infos = env.step(actions[0] * 0)
-        last, *_ = task.step(actions[0] * 0)
-    assert done.all()
-    for own, end in zip(infos, last.numpy(), strict=True):
-        assert (own["TimeLimit.truncated"], own["is_success"]) == (True, False)
-        np.testing.assert_array_equal(own["terminal_observation"], end)
-    np.testing.assert_array_equal(obs, task.reset()[0].numpy())
-
-
 def test_success_in_the_last_step_is_no_lack_of_time(actions):
     env = make(num_envs=1)
     env.reset()
@@ -154,18 +122,6 @@ def test_named_observations_have_no_nested_names():
     assert set(infos[0]["terminal_observation"]) == set(obs)
     model = PPO("MultiInputPolicy", env, n_steps=2, batch_size=6, n_epochs=1, device="cpu")
     model.learn(6)
-
-
-def test_their_wrappers():
-    env = VecMonitor(VecCheckNan(make(), raise_exception=True), info_keywords=("is_success",))
-    env = VecFrameStack(VecNormalize(env), 2)
-    assert env.reset().shape == (NUM_ENVS, 70)
-    for _ in range(50):
-        *_, infos = env.step(np.zeros((NUM_ENVS, 8), np.float32))
-    episode = infos[0]["episode"]
-    assert (episode["l"], episode["is_success"]) == (50, False)
-    assert episode["r"] > 0
-    assert infos[0]["terminal_observation"].shape == (70,)
 
 
 def test_what_environments_say_of_themselves():

@@ -55,10 +55,3 @@ def expect_untouched(both: Pair, before: dict, env_ids: list[int]) -> None:
     for group, entries in before.items():
         for name, rows in entries.items():
             np.testing.assert_array_equal(after[group][name][env_ids], rows[env_ids])
-
-
-@pytest.mark.parametrize("task_id", BATCHED)
-def test_last_batch_may_be_smaller(task_id):
-    both = pair(task_id, num_envs=NUM_ENVS)
-    episodes = random_episodes(range(NUM_ENVS + 2), 5, both.ours.action_dim)
-    assert complaints(both.play(episodes)) == []

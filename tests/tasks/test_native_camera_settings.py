@@ -6,21 +6,19 @@ import copy
 import math
 from collections.abc import Mapping
 from contextlib import closing
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 import tasks
-from parity.native import make_native, native_action, native_action_dim, quiet
 from tests.native import NATIVE
 from tests.quick import quick_cases
-from tests.tasks.test_native_cameras import EVERYTHING, differences, our_look
+from tests.tasks.test_native_cameras import EVERYTHING, Look, differences, native_look, our_look
 
 pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 
-SEED = 7
 HALF = math.sqrt(0.5)
 ROLLED = [0.5, 0.3, 0.6, 0.16, 0.386, -0.134, -0.899]  # looks at the cube, and is rolled
 INTRINSIC = np.array([[100.0, 0.0, 60.0], [0.0, 110.0, 50.0], [0.0, 0.0, 1.0]])
@@ -54,24 +52,6 @@ def unit(settings: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-class Look(NamedTuple):
-    """What native told: after a reset and a step, and the picture for people."""
-
-    actions: np.ndarray
-    observations: list[Any]
-    picture: torch.Tensor
-
-
-def native_look(task_id: str, obs_mode: str, robot: str | None = None, **making: Any) -> Look:
-    with closing(make_native(task_id, obs_mode=obs_mode, robot_uid=robot, **making)) as env:
-        actions = np.random.default_rng(SEED).uniform(-1, 1, (1, native_action_dim(env)))
-        actions = actions.astype(np.float32)
-        with quiet():
-            told = [env.reset(seed=SEED, options={"reconfigure": True})[0]]
-            told.extend(env.step(native_action(env, action))[0] for action in actions)
-            return Look(actions, told, env.render_rgb_array())
-
-
 def our_differences(look: Look, task_id: str, obs_mode: str, **making: Any) -> list[str]:
     with closing(tasks.make(task_id, obs_mode=obs_mode, render_mode="rgb_array", **making)) as env:
         found = differences(look.observations, our_look(env, look.actions))
@@ -86,7 +66,8 @@ def our_differences(look: Look, task_id: str, obs_mode: str, **making: Any) -> l
 )
 def test_settings_by_name_are_native_s(what: str):
     sensors = unit(SETTINGS[what])
-    look = native_look("PickCube-v1", EVERYTHING, "panda_wristcam", sensors=copy.deepcopy(sensors))
+    native = {"robot_uid": "panda_wristcam", "sensors": copy.deepcopy(sensors)}
+    look = native_look("PickCube-v1", EVERYTHING, **native)
     making = {"robots": "panda_wristcam", "sensor_configs": sensors}
     assert our_differences(look, "PickCube-v1", EVERYTHING, **making) == []
     if "size" in what:

@@ -25,15 +25,15 @@ SEED = 7
 
 
 class Look(NamedTuple):
-    """What native told of an episode: after the reset, then after each step."""
+    """What native told: after a reset, then after each step, and the picture for people."""
 
     actions: np.ndarray
     observations: list[Any]
     picture: torch.Tensor
 
 
-def native_look(task_id: str, obs_mode: str, steps: int) -> Look:
-    env = make_native(task_id, obs_mode=obs_mode)
+def native_look(task_id: str, obs_mode: str, steps: int = 1, **making: Any) -> Look:
+    env = make_native(task_id, obs_mode=obs_mode, **making)
     with closing(env), quiet():
         size = steps, native_action_dim(env)
         actions = np.random.default_rng(SEED).uniform(-1, 1, size).astype(np.float32)
@@ -69,7 +69,7 @@ def differences(native: list[Any], ours: list[Any]) -> list[str]:
 
 @pytest.fixture(scope="module")
 def pick() -> Look:
-    return native_look("PickCube-v1", EVERYTHING, steps=1)
+    return native_look("PickCube-v1", EVERYTHING)
 
 
 def test_a_fixed_camera_sees_what_native_sees(pick: Look):
@@ -89,11 +89,7 @@ CAMERA = Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1))
     ("mutant", "part"),
     [
         (replace(CAMERA, fov=CAMERA.fov * 1.01), "sensor_param/base_camera/intrinsic_cv"),
-        (replace(CAMERA, fov=CAMERA.fov * 1.01), "sensor_data/base_camera/rgb"),
-        (replace(CAMERA, eye=(0.301, 0.0, 0.6)), "sensor_data/base_camera/depth"),
         (replace(CAMERA, target=(-0.1, 0.001, 0.1)), "sensor_data/base_camera/rgb"),
-        (replace(CAMERA, near=0.5), "sensor_data/base_camera/rgb"),
-        (replace(CAMERA, width=127), "sensor_data/base_camera/rgb"),
     ],
 )
 def test_another_camera_is_noticed(pick: Look, mutant: Camera, part: str):
@@ -114,11 +110,10 @@ def test_a_camera_is_turned_as_native_turns_it():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("obs_mode", [EVERYTHING, "rgb+state", "depth+state_dict"])
 @pytest.mark.parametrize("task_id", TASKS)
-def test_every_clone_sees_what_native_sees(task_id: str, obs_mode: str):
-    look = native_look(task_id, obs_mode, steps=5)
-    with closing(tasks.make(task_id, obs_mode=obs_mode, render_mode="rgb_array")) as env:
+def test_every_clone_sees_what_native_sees(task_id: str):
+    look = native_look(task_id, EVERYTHING, steps=5)
+    with closing(tasks.make(task_id, obs_mode=EVERYTHING, render_mode="rgb_array")) as env:
         assert differences(look.observations, our_look(env, look.actions)) == []
         same = look.picture.shape[1:] == (512, 512, 3) and torch.equal(
             torch.from_numpy(env.render()), look.picture

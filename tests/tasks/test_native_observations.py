@@ -26,22 +26,9 @@ SEED = 7
 EVERYTHING = "rgb+depth+segmentation+position"
 STATES = ("state", "state_dict", "none")
 QUICK = (  # modes of native's usual shaders
-    "rgb",
-    "depth",
-    "segmentation",
-    "position",
-    "rgbd",
-    "pointcloud",
-    "sensor_data",
-    EVERYTHING,
-    "rgb+none",
-    "rgb+rgb",
-    "state+none",
-    "state+state_dict",
-    "segmentation+state+rgb",
-    "depth+state_dict",
-    "rgb+state+state_dict",
-    "pointcloud+state",
+    *("rgb", "depth", "segmentation", "position", "rgbd", "pointcloud", "sensor_data", EVERYTHING),
+    *("rgb+none", "rgb+rgb", "state+none", "state+state_dict", "segmentation+state+rgb"),
+    *("depth+state_dict", "rgb+state+state_dict", "pointcloud+state"),
 )
 SLOW = (  # which native's shaders called "default" alone have
     "normal",
@@ -52,20 +39,10 @@ SLOW = (  # which native's shaders called "default" alone have
 )
 SHADERS = {"shader_pack": "default"}  # native's sensor_configs for these
 OTHER_ROBOTS = {  # that native's task allows or a Panda stands for: a wrist with a camera, or none
-    **dict.fromkeys(("StackCube-v1", "StackPyramid-v1"), "panda"),
-    **dict.fromkeys(
-        (
-            "LiftPegUpright-v1",
-            "PickCube-v1",
-            "PlaceSphere-v1",
-            "PokeCube-v1",
-            "PullCube-v1",
-            "PullCubeTool-v1",
-            "PushCube-v1",
-            "RollBall-v1",
-        ),
-        "panda_wristcam",
-    ),
+    **{f"{task}-v1": "panda" for task in ("StackCube", "StackPyramid")},
+    **{f"{task}-v1": "panda_wristcam" for task in ("LiftPegUpright", "PickCube", "PlaceSphere")},
+    **{f"{task}-v1": "panda_wristcam" for task in ("PokeCube", "PullCube", "PullCubeTool")},
+    **{f"{task}-v1": "panda_wristcam" for task in ("PushCube", "RollBall")},
 }
 
 
@@ -84,7 +61,7 @@ def told(tree: Any, name: str = "") -> list[tuple[str, Any]]:
 
 
 def differences(native: Any, ours: Any) -> list[str]:
-    """Name what differs between two observations: other keys, another order, type or value."""
+    """Name what differs of two observations or spaces: keys, their order, a type or a value."""
     theirs, own = told(native), told(ours)
     if [name for name, _ in theirs] != [name for name, _ in own]:
         return [f"keys: {[name for name, _ in theirs]} and {[name for name, _ in own]}"]
@@ -92,16 +69,9 @@ def differences(native: Any, ours: Any) -> list[str]:
 
 
 def same(a: Any, b: Any) -> bool:
-    if isinstance(a, dict) or isinstance(b, dict):
+    if not isinstance(a, torch.Tensor):
         return a == b
     return (a.dtype, a.shape) == (b.dtype, b.shape) and torch.equal(a, b)
-
-
-def space_differences(native: gymnasium.Space[Any], ours: gymnasium.Space[Any]) -> list[str]:
-    theirs, own = told(native), told(ours)
-    if [name for name, _ in theirs] != [name for name, _ in own]:
-        return [f"keys: {[name for name, _ in theirs]} and {[name for name, _ in own]}"]
-    return [name for (name, a), (_, b) in zip(theirs, own, strict=True) if a != b]
 
 
 @contextmanager
@@ -139,7 +109,7 @@ def compare(task_id: str, mode: str, actions: np.ndarray, seen: list[Any], **mak
         own += [env.step(action[None])[0] for action in actions]
         for (observed, space), ours in zip(seen, own, strict=True):
             assert differences(observed, ours) == []
-            assert space_differences(space, env.single_observation_space) == []
+            assert differences(space, env.single_observation_space) == []
         assert env.observation_space == gymnasium.vector.utils.batch_space(space, 1)
 
 
@@ -163,17 +133,6 @@ def test_a_robots_own_camera_is_in_every_mode(pick: Any):
         actions, seen = watch(native, modes, steps=1)
     for mode in modes:
         compare("PickCube-v1", mode, actions, seen[mode], **making)
-
-
-@pytest.mark.long
-def test_normals_and_albedo_are_those_of_natives_default_shaders():
-    with native_in("PickCube-v1", "rgb", sensors=SHADERS) as native:
-        actions, seen = watch(native, SLOW[-1:], steps=1)
-    compare("PickCube-v1", SLOW[-1], actions, seen[SLOW[-1]])
-    first, last = (observed["sensor_data"]["base_camera"] for observed, _ in seen[SLOW[-1]])
-    assert len(first["normal"].unique()) > 100
-    assert len(first["albedo"].unique()) > 10
-    assert not torch.equal(first["normal"], last["normal"])
 
 
 # Both observe flags.

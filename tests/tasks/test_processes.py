@@ -68,22 +68,17 @@ def no_collector():
         gc.enable()
 
 
+@pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("front", FRONTS)
-def test_closing_frees_the_worlds_at_once(front):
+def test_worlds_are_freed_at_once_when_they_are_closed_or_nobody_holds_them(front, closed):
     with no_collector():
         env = FRONTS[front]()
         world = weakref.ref(worlds_below(task_of(env).simulation)[0])
-        env.reset()
-        env.close()
-        assert world() is None
-
-
-@pytest.mark.parametrize("front", FRONTS)
-def test_what_nobody_holds_is_freed_unclosed(front):
-    with no_collector():
-        env = FRONTS[front]()
-        world = weakref.ref(worlds_below(task_of(env).simulation)[0])
-        del env
+        if closed:
+            env.reset()
+            env.close()
+        else:
+            del env
         assert world() is None
 
 
@@ -178,9 +173,6 @@ def test_an_error_of_ours_keeps_its_type_and_says_where_it_came_from():
     assert "in build" in str(caught.value.__cause__)
 
 
-# -- threads --------------------------------------------------------------------------------------
-
-
 # -- forks ----------------------------------------------------------------------------------------
 
 
@@ -233,6 +225,3 @@ def test_pictures_in_a_fork_are_refused_in_the_place_of_a_hang():
             assert "use spawn in the place of fork" in str(error)
         assert in_fork(lambda: env.close()) is None  # freeing what draws would hang as well
         np.testing.assert_array_equal(env.render(), picture)
-
-
-# -- copies ---------------------------------------------------------------------------------------

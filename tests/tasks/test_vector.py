@@ -168,17 +168,6 @@ def test_seeds():
         env.reset(seed=-1)
 
 
-def test_an_action_is_checked_once():
-    env = VectorTask("PickCube-v1", num_envs=2, num_workers=0)
-    checked = env._backend.batches[0]._task._reader.checked
-    assert np.shares_memory(checked, env._backend.arrays["action"])
-    wrong = np.zeros((2, 8), np.float32)
-    wrong[1, 2] = np.inf
-    with pytest.raises(ActionError, match="action number 2 is inf in environment 1"):
-        env.step(wrong)
-    assert not checked.any()
-
-
 def test_actions_by_robot_and_wrong_ones():
     env = make("TwoRobotPickCube-v1", num_envs=2, num_workers=1)
     with closing(env):
