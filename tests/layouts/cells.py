@@ -11,6 +11,7 @@ import yourdfpy
 
 from layouts import Layout, Placement, ceiling, wall
 from robot_layouts.kinematics.rotations import pose_matrix
+from robots import RobotDescriptor
 
 
 def mixed_cell() -> Layout:
@@ -25,7 +26,7 @@ def mixed_cell() -> Layout:
     )
 
 
-def hung(robot: str) -> Layout:
+def hung(robot: str | RobotDescriptor) -> Layout:
     """One robot upside down under a ceiling, turned."""
     return Layout(
         {"arm": Placement(robot, (0.1, -0.2, 0.0), on="ceiling", rpy=(0.0, 0.0, 1.0))},

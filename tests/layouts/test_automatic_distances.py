@@ -149,11 +149,6 @@ def test_a_robot_stands_on_its_wheels_beside_one_that_stands_on_its_base(way, tm
     assert not [f for f in layout.validate(workspaces=False, table=(-2.0, -2.0, 2.0, 2.0)).findings]
 
 
-def test_a_robot_on_high_legs_is_not_raised(tmp_path):
-    robots = {"left": on_a_wheel(tmp_path, -0.3), "right": "panda"}
-    assert side_by_side(robots, spacing="auto")["left"].base_position[2] == 0.0
-
-
 @pytest.mark.long
 def test_robots_of_tall_bodies_stoop_and_come_near_enough_to_work_together():
     layout = face_to_face({"left": "fetch", "right": "fetch"})

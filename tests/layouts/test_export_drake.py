@@ -120,12 +120,6 @@ def test_only_a_folder_of_its_own_is_replaced(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["arm.dmd.yaml", "arm_robots"]
 
 
-def test_a_wrong_ending_is_refused(tmp_path):
-    with pytest.raises(LayoutError, match=r"'arm.yaml'; the name must end in .dmd.yaml"):
-        single({"arm": "so100"}).to_drake(tmp_path / "arm.yaml")
-    assert list(tmp_path.iterdir()) == []
-
-
 ODD = with_tip(shape('<mesh filename="box.stl"/>') + shape('<mesh filename="box.stl"/>', "visual"))
 
 

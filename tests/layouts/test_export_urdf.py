@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from layouts import Layout, Placement, face_to_face, single
-from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
+from layouts import Layout, Placement, single
+from robots import AssetError, LocalUrdf, RobotRegistry
 from robots.urdf.summary import read_references
 from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
@@ -150,12 +150,6 @@ def test_robots_whose_looks_are_missing_can_be_saved_without(tmp_path):
         root = ElementTree.parse(path).getroot()
         assert root.find("link/visual") is None
         assert len(root.findall("link/collision")) > 8
-
-
-def test_a_wrong_ending_is_refused(tmp_path):
-    with pytest.raises(LayoutError, match=r"'cell.xml'; the name must end in .urdf"):
-        face_to_face({"a": "panda", "b": "panda"}, spacing=1.0).to_urdf(tmp_path / "cell.xml")
-    assert list(tmp_path.iterdir()) == []
 
 
 def _position(positions: dict[str, dict[str, float]], name: str) -> float:

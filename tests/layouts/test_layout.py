@@ -80,11 +80,6 @@ class TestReplaceRobots:
         with pytest.raises(UnknownNameError, match="'rigt'.*'right'.*left, right"):
             layout.replace_robots(rigt="panda")
 
-    def test_unknown_robot_names_the_closest(self):
-        layout = face_to_face(PANDAS, spacing=1.5)
-        with pytest.raises(UnknownNameError, match="Did you mean 'panda_stick'"):
-            layout.replace_robots(right="panda_stik")
-
     def test_a_keyframe_the_new_robot_lacks_is_refused(self):
         layout = face_to_face(PANDAS, spacing=1.5, keyframe="tabletop")
         with pytest.raises(UnknownNameError, match="keyframe of panda_stick 'tabletop'"):
@@ -117,12 +112,6 @@ class TestIdentity:
         with pytest.raises(TypeError):
             layout["left"] = layout["right"]
 
-    def test_changing_the_mapping_it_was_made_from_does_not_change_it(self):
-        placements = {"arm": Placement("panda")}
-        layout = Layout(placements)
-        placements["other"] = Placement("panda")
-        assert list(layout) == ["arm"]
-
 
 class TestRefusals:
     def test_no_robot(self):
@@ -133,10 +122,6 @@ class TestRefusals:
         arm = Placement("panda")
         with pytest.raises(LayoutError, match=r"\['arm'\] are given twice"):
             Layout.of(("arm", arm), ("other", arm), ("arm", arm))
-
-    def test_pairs_keep_their_order(self):
-        arm = Placement("panda")
-        assert list(Layout.of(("b", arm), ("a", arm))) == ["b", "a"]
 
     @pytest.mark.parametrize("name", ["", "left arm", "left-arm", "1st", 7])
     def test_a_name_that_is_no_identifier(self, name):
@@ -151,10 +136,6 @@ class TestRefusals:
         layout = face_to_face(PANDAS, spacing=1.5)
         with pytest.raises(KeyError, match="'lft'.*Did you mean 'left'.*left, right"):
             layout["lft"]
-
-    def test_an_unknown_keyframe_names_the_robot_and_the_choices(self):
-        with pytest.raises(UnknownNameError, match="keyframe of panda 'ret'.*'rest'"):
-            Placement("panda", keyframe="ret")
 
     @pytest.mark.parametrize("quaternion", [(0, 0, 0, 0), (1, 1, 0, 0), (1.01, 0, 0, 0)])
     def test_a_quaternion_that_is_no_rotation_tells_its_length(self, quaternion):

@@ -29,10 +29,8 @@ from robots import (
 )
 from robots.bodies.hulls import load_model
 from tests.catalogue import every_robot
-from tests.layouts.cells import overlapping
 from tests.layouts.small_robots import (
     FOLDING,
-    TURNTABLE,
     folding,
     joint,
     link,
@@ -44,7 +42,6 @@ from tests.layouts.small_robots import (
 PANDAS = {"left": "panda", "right": "panda"}
 TURN = joint("turn", "base", "top", xyz="0 0 0.35")
 TABLE = (-0.7245, -1.209, 0.4845, 1.209)
-MIXED = ("panda", "panda_stick", "so100", "panda", "so100", "panda_stick", "so100", "panda")
 
 
 def pair(robot_, distance, **placement):
@@ -55,21 +52,6 @@ def pair(robot_, distance, **placement):
             for name, y in (("one", 0.0), ("other", distance))
         }
     )
-
-
-def circle(kinds, radius):
-    """Robots around a centre that they face."""
-    placements = {}
-    for i, kind in enumerate(kinds):
-        angle = 2 * math.pi * i / len(kinds)
-        ahead = math.pi / 2 if kind == "so100" else 0.0  # it reaches out along its own -y
-        placements[f"arm_{i}"] = Placement(
-            kind,
-            (radius * math.cos(angle), radius * math.sin(angle), 0.0),
-            yaw_quaternion(angle + math.pi + ahead),
-            keyframe="rest",
-        )
-    return Layout(placements)
 
 
 def kinds(report):
@@ -106,12 +88,6 @@ class TestPandas:
         nearer = side_by_side(PANDAS, spacing=advised - 0.02).validate(workspaces=False)
         assert nearer.findings
 
-    def test_eight_mixed_robots_in_a_ring(self):
-        report = circle(MIXED, 1.2).validate()
-        assert report.ok, str(report)
-        assert len(report.clearances) == 28
-        assert "and 16 pairs that stay farther apart" in str(report)
-
 
 class TestDistances:
     def test_between_boxes_they_are_exact(self, tmp_path):
@@ -141,14 +117,6 @@ class TestDistances:
         assert (finding.kind, finding.serious) == ("clearance", False)
         assert finding.amount == pytest.approx(0.015)
         assert "0.010 m farther apart (0.125 m between their bases" in finding.advice
-
-    def test_the_nearest_boxes_need_not_be_those_of_the_nearest_bounds(self, tmp_path):
-        """The turned tops' boxes along the axes are 11.3 cm apart, but the tops 11.7 cm."""
-        text = TURNTABLE.replace('size="0.1 0.1 0.1"', 'size="0.1 0.135 0.1"', 1)
-        arm = robot(tmp_path, text, ["turn"], rest=[math.pi / 6])
-        (between,) = pair(arm, 0.25).validate(samples=0, workspaces=False).clearances
-        assert between.links == ("base", "base")
-        assert between.distance == pytest.approx(0.115, abs=1e-9)
 
     @pytest.mark.parametrize("seed", range(6))
     def test_the_nearest_links_are_the_nearest_of_all(self, seed):
@@ -201,9 +169,6 @@ class TestSelfCollisions:
         assert [pair.links for pair in finding.links] == [("base", "lower")]
         assert finding.amount == pytest.approx(0.1, abs=0.01)
         assert "arm touches itself at the keyframes: arm.base with arm.lower" in finding.what
-
-    def test_stretched_out_they_are_none(self, tmp_path):
-        assert self.fold(tmp_path, 0.0).ok
 
     def test_noise_alone_can_cause_them(self, tmp_path):
         still = self.fold(tmp_path, 2.7)
@@ -276,9 +241,6 @@ class TestTable:
         assert {c.between for c in report.clearances if c.table} == {("a", "table"), ("b", "table")}
         sunk = Layout({"a": replace(layout["a"], position=(0.1, 0, -0.3))}, layout.frames)
         assert kinds(sunk.validate(workspaces=False)) == ["table"]
-
-    def test_beside_it_there_is_none(self):
-        assert self.validate(position=(2.0, 0.0, -0.2)).ok
 
     @pytest.mark.parametrize("table", [(1, 0, 0, 1), (0, 0, 1, math.nan)])
     def test_one_that_is_no_rectangle_is_refused(self, table):
@@ -376,11 +338,6 @@ class TestWorkspaces:
         assert 0 < far.shared[0].shares[0] < near.shared[0].shares[0] < 1
         assert "left and right share" in str(near)
 
-    def test_robots_out_of_reach_share_nothing(self):
-        report = side_by_side(PANDAS, spacing=3.0).validate(samples=0)
-        assert not report.shared
-        assert set(report.workspaces) == {"left", "right"}
-
     def test_one_too_large_to_sample_is_left_out(self):
         report = Layout({"arm": Placement("floating_panda_gripper")}).validate(samples=0)
         assert report.workspaces == {}
@@ -446,14 +403,6 @@ class TestPicture:
         written = [text.get_text().strip() for text in plan.texts]
         assert {"left", "right", "cube", "4.1 cm"} <= set(written)
         assert plan.get_title(loc="right") == "ok"
-
-    def test_no_word_covers_another_where_four_hands_meet(self):
-        from layouts.validation.report import draw
-
-        layout = around_table({name: "panda" for name in "abcd"})
-        figure = draw(layout.validate(workspaces=False))
-        assert len(figure.axes[0].texts) >= 4 + 3
-        assert overlapping(figure.axes[0].texts) == []
 
 
 def test_without_fcl_the_error_names_the_extra(monkeypatch):
