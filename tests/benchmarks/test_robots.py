@@ -17,14 +17,11 @@ from benchmarks.robots.judge import (
 )
 from benchmarks.robots.survey import (
     Robot,
-    find_robots,
-    named_folder,
     probe,
 )
 from tests.three_links import arm, save
 
 RECORD = Path(__file__).parents[2] / "docs" / "robots.json"
-FIXED = '<robot name="still"><link name="a"/></robot>'
 
 
 def loaded(**groups: tuple[tuple[str, ...], int]) -> dict:
@@ -55,16 +52,6 @@ def quick_probe(tmp_path, monkeypatch):
 
 def seeing(seen: dict) -> str:
     return f"print({json.dumps(seen)!r}, flush=True)"
-
-
-class TestSources:
-    def test_urdfs_with_joints_that_move_are_found(self, tmp_path):
-        (tmp_path / "deep").mkdir()
-        save(tmp_path / "deep", arm(), "small.urdf")
-        save(tmp_path, FIXED, "still.urdf")
-        (robot,) = find_robots([named_folder(f"mine={tmp_path}")])
-        assert robot.key == "mine/deep/small.urdf"
-        assert robot.file.is_file()
 
 
 class TestProbe:

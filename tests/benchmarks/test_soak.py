@@ -1,16 +1,12 @@
 """``python -m benchmarks soak``: what is healthy passes, and what leaks is reported."""
 
-from contextlib import contextmanager, redirect_stdout
+from contextlib import redirect_stdout
 from io import StringIO
 
 import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.soak import (
-    Level,
-    Soaked,
-    between_laps,
-    complaints,
     growth,
 )
 from tasks import register_task
@@ -18,10 +14,6 @@ from tests.data import leaking_tasks
 from tests.fresh_process import in_fresh_process
 
 SMALL = ["--envs", "2", "--workers", "1", "--steps", "1"]
-
-
-def level(memory: float = 0.0, descriptors: float = 0.0) -> Level:
-    return Level(memory, descriptors, 1, 0, 0)
 
 
 def soaked(task_id: str, leaking: type | None = None) -> tuple[int, list[str]]:
@@ -55,27 +47,6 @@ def test_a_task_that_leaks_is_reported(leaking, quantity):
         f"GROWS: Leaking-v1: {quantity} in this process",
         f"GROWS: {quantity} of this process, from lap to lap",
     ]
-
-
-def test_laps_are_compared_task_by_task():
-    """Tasks need more or less, and one may keep a piece of memory by chance."""
-    first, second, third = found = [Soaked(name) for name in "abc"]
-    first.after = [level(100), level(200), level(202), level(204)]
-    second.after = [level(500), level(510), level(510), level(514)]
-    third.after = [level(100), level(100), level(190), level(190)]
-    for task in found:
-        task.workers, task.rounds = [[level()]], [[level()]]
-    assert between_laps(found).memory == 2
-    assert complaints(found) == ["memory of this process, from lap to lap"]
-    third.after = second.after = first.after = [level(1), level(2), level(2), level(2)]
-    assert complaints(found) == []
-
-
-@contextmanager
-def memory():
-    kept = [b"x" * 20_000_000]
-    yield
-    kept.clear()
 
 
 @pytest.mark.parametrize(

@@ -79,8 +79,6 @@ def test_bounds_and_the_lowest_point_count_what_collides():
 
 
 def test_a_mesh_counts_as_its_convex_hull(tmp_path):
-    import trimesh
-
     trimesh.creation.annulus(0.1, 0.2, 0.3).export(tmp_path / "ring.stl")
     found = mass_of([Mesh(tmp_path / "ring.stl", scale=(2.0, 2.0, 2.0))])
     assert found.volume == pytest.approx(8 * math.pi * 0.2**2 * 0.3, rel=0.02)
