@@ -8,7 +8,7 @@ import pytest
 import tasks
 from layouts import Layout, Placement
 from robot_layouts.experts import find_expert
-from robot_layouts.experts.grasps import cube_grips, held_at, is_near
+from robot_layouts.experts.grasps import cube_grips, held_at
 from robot_layouts.experts.rehearsal import Rehearsal
 from robot_layouts.experts.script import Scene, Waypoint
 from robot_layouts.kinematics.rotations import rotate
@@ -102,15 +102,6 @@ def test_what_is_held_ends_where_it_was_asked_to(rehearsal):
     in_gripper = _axes(quaternion).T @ (cube - position)
     for position, quaternion in held_at(scene, "arm", "cubeA", place, (-0.5, 0.5), (0.0, 0.4)):
         np.testing.assert_allclose(position + _axes(quaternion) @ in_gripper, place, atol=1e-6)
-
-
-def test_near_means_every_axis(rehearsal):
-    scene = rehearsal.begin(3)
-    offset = scene.body("cubeA")[0] - scene.body("cubeB")[0]
-    assert is_near(scene, "cubeA", "cubeB", offset, 1e-6)
-    for axis in np.eye(3):
-        assert is_near(scene, "cubeA", "cubeB", offset + 0.009 * axis, 0.01)
-        assert not is_near(scene, "cubeA", "cubeB", offset + 0.011 * axis, 0.01)
 
 
 def test_two_waypoints_of_one_name_are_refused(rehearsal):

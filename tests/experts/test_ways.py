@@ -11,12 +11,10 @@ import pytest
 import tasks
 from robot_layouts.experts import first_success
 from robot_layouts.experts.geometry import gripper_facing
-from robot_layouts.experts.obstacles import obstacles
 from robot_layouts.experts.rehearsal import Rehearsal
 from robot_layouts.experts.script import CLOSED, Pose, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
 from robot_layouts.experts.ways import NoWayError, Ways
-from robot_layouts.kinematics.rotations import transform
 
 HALF_PI = np.pi / 2
 MIDDLE = np.array([0.0, 0.0, 0.3])
@@ -122,17 +120,6 @@ def test_bodies_are_in_the_way_unless_the_hand_is_at_them():
 
     assert len(way_to(cube)) == 1
     assert len(way_to(beside[1])) > 1
-
-
-def test_a_scene_s_bodies_stand_where_they_are(two_arms: Rehearsal):
-    scene = two_arms.begin(0)
-    found = obstacles(scene)
-    cube = found["cube"]
-    assert cube.name == "the cube"
-    np.testing.assert_allclose(
-        transform(np.asarray(cube.pose), cube.shapes[0]).mean(axis=0), scene.body("cube")[0]
-    )
-    assert "goal_site" not in found  # nothing can touch it
 
 
 def test_without_the_extra_the_reason_says_so(monkeypatch: pytest.MonkeyPatch):

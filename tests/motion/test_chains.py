@@ -7,7 +7,6 @@ from layouts import Layout, Placement
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.model.link_poses import LinkPoses
 from tests.catalogue import every_robot
-from tests.layouts.cells import mixed_cell
 from tests.motion import cells
 
 
@@ -31,9 +30,3 @@ def test_parts_of_every_robot_are_where_its_tree_has_them(robot):
     found = differences(cell, LinkPoses(cell, range(len(cell.parts))), qpos)
     assert len(found) == len(cell.parts) - 1
     assert max(found.values(), default=0.0) < 1e-12
-
-
-def test_parts_of_several_robots_are_there_at_once():
-    cell = Cell(mixed_cell())
-    qpos, _ = cells.states(cell, 5)
-    assert max(differences(cell, LinkPoses(cell, range(len(cell.parts))), qpos).values()) < 1e-12

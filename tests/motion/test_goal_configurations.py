@@ -1,7 +1,5 @@
 """Goals that take a longer search: postures that are not met with at first."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.model.obstacles import box
 from robot_layouts.motion.planning.goals import PlaceGoal, read_targets
-from robot_layouts.motion.planning.query import choices, find_goal_configurations
+from robot_layouts.motion.planning.query import find_goal_configurations
 from tests.motion.two_pandas import aside, cell, in_the_middle
 
 HARD = TcpGoal((-0.465, -0.112, 0.763), (0.46803, 0.79404, 0.09321, 0.37802))
@@ -60,9 +58,3 @@ def test_an_obstacle_is_avoided_by_a_posture_of_a_longer_search():
     _, right, start = meeting(whole, others=elsewhere)
     (end,) = find_goal_configurations([right], Clearances(whole, ["right"], 0.01), start, 0.0)
     assert np.array_equal(end[right.moving], elsewhere[0])
-
-
-def test_choices_come_by_their_sum():
-    counts = [3, 1, 2, 4]
-    known = sorted(product(*map(range, counts)), key=lambda choice: (sum(choice), choice))
-    assert list(choices(counts)) == known

@@ -19,10 +19,6 @@ def path(share=0.8):
     return Path(POINTS, np.array([0.0, *inner, 0.0]), SPEEDS)
 
 
-def test_one_unit_of_a_path_is_a_second_at_full_speed():
-    assert np.allclose(way(POINTS, SPEEDS), [1.0, 1.0, 1.0])
-
-
 def test_a_rounded_path_has_continuous_slopes_and_bends():
     rounded = path()
     s, step = np.linspace(0.0, rounded.length, 3001), 1e-6
