@@ -86,13 +86,6 @@ def test_efforts_that_move_nothing_are_raised_and_the_reason_says_so(tmp_path):
     assert any("more than the URDF's efforts for a_joint1" in reason for reason in found.reasons)
 
 
-def test_it_stays_where_it_stands(tmp_path):
-    standing = Standing(weighing(5.0, 100.0), tmp_path)
-    standing.again()
-    after = standing.play(np.zeros(6, np.float32), 20)
-    np.testing.assert_allclose(after, standing.start, atol=1e-3)
-
-
 def test_every_joint_of_a_mimic_tree_goes_where_its_leader_sends_it(tmp_path):
     parts, last = single_arm(end="")
     knuckles(parts, last)

@@ -19,7 +19,6 @@ from robot_layouts.simulation.checks.objects import (
     try_thing_grasps,
 )
 
-CORNERS = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (-0.02, 0.02)]
 FEWEST_GRASPS = 20
 GRASPED = [name for name in CATALOGUE if ObjectRegistry.load(name).grasps]
 
@@ -87,23 +86,6 @@ def _planes(vertices, triangles):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     normals *= np.sign(np.einsum("ij,ij->i", one - vertices.mean(axis=0), normals))[:, None]
     return np.column_stack([normals, np.einsum("ij,ij->i", normals, one)])
-
-
-def pair(*, visuals=False):
-    """A world with a box, and beside it the hull of a box's corners, of other matter than usual."""
-    turned = (0.9659258262890683, 0.0, 0.0, 0.25881904510252074)  # 30° about z
-    rough = {
-        "density": 500.0,
-        "friction": Friction(0.9, 0.8, 0.1),
-        "position": (0.03, 0.0, 0.02),
-        "quaternion": turned,
-    }
-
-    def build(world, number):
-        world.add("box", Box((0.1, 0.05, 0.02), **rough), position=(1.0, -0.3, 0.3))
-        world.add("hull", ConvexHull(tuple(CORNERS), **rough), position=(1.0, 0.3, 0.3))
-
-    return Simulation(single({"arm": "panda"}), build, 1, visuals=visuals)
 
 
 def test_things_stand_still_for_ten_seconds():

@@ -10,7 +10,6 @@ import sapien
 
 import tasks
 from robot_layouts.simulation.rendering import Cameras, vulkan_problem
-from robot_layouts.simulation.sapien3.studio import look_at
 from robots import SimulationError, TaskError
 
 TASK = "TwoRobotPickCube-v1"
@@ -85,25 +84,6 @@ def test_worlds_without_visuals_are_refused():
         Cameras(plain.simulation, (1.0, 0.0, 1.0), (0.0, 0.0, 0.0))
     with pytest.raises(TaskError, match="render_mode='rgb_array'"):
         plain.render()
-
-
-@pytest.mark.parametrize(
-    ("eye", "target"),
-    [((1.4, 0.8, 0.75), (0.0, 0.1, 0.1)), ((0.0, 0.0, 2.0), (0.0, 0.0, 0.0))],
-    ids=["aside", "from above"],
-)
-def test_a_camera_looks_at_its_target(eye, target):
-    matrix = look_at(eye, target).to_transformation_matrix()
-    towards = np.subtract(target, eye) / np.linalg.norm(np.subtract(target, eye))
-    np.testing.assert_allclose(matrix[:3, 0], towards, atol=1e-6)
-    np.testing.assert_allclose(matrix[:3, 3], eye, atol=1e-6)
-    assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1, abs=1e-5)
-    assert abs(matrix[2, 1]) < 1e-6  # the picture's horizon is level
-
-
-def test_a_camera_cannot_look_at_itself():
-    with pytest.raises(SimulationError, match="cannot look at the point where it is"):
-        look_at((1.0, 0.0, 1.0), (1.0, 0.0, 1.0))
 
 
 def run_without_driver(code: str) -> subprocess.CompletedProcess[str]:

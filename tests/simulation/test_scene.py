@@ -68,12 +68,6 @@ def test_robots_hold_their_keyframes(cell):
             assert positions[joint] == pytest.approx(value, abs=0.02)
 
 
-def test_it_steps_as_the_settings_say(cell):
-    scene = build_scene(cell)
-    assert scene.timestep == pytest.approx(1 / 100)
-    assert isinstance(scene.physx_system, physx.PhysxCpuSystem)
-
-
 def test_the_merged_urdf_is_the_same_robots_in_sapien(cell, tmp_path):
     scene = sapien.Scene([physx.PhysxCpuSystem()])
     loader = URDFLoader()

@@ -2,38 +2,25 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 import pytest
 
 from layouts import Layout, Placement
 from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.pose_follower import PinocchioFollower
-from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.solvers import ArmModel, TreeArm, TreeFollower
 from robots import DescriptorError, RobotRegistry, UnknownNameError
 from tests.catalogue import QUICK
+from tests.simulation.test_kinematics import start_of, world_of
 
-BASE = ((0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6))
 POINT = np.array([0.01, -0.02, 0.03])
 HOW_FAR = 0.05  # rad, m
 HANDS = ("allegro_hand_right",)  # fingers of four joints that hardly tell some turns apart
 
 
-@functools.cache
-def world_of(robot: str) -> BuiltWorld:
-    """Make a world with one robot that neither stands at the origin nor faces along x."""
-    return BuiltWorld(Layout({"arm": Placement(RobotRegistry.load(robot), *BASE)}))
-
-
 def arms_of(robot: str) -> tuple[SapienArm, TreeArm]:
     world = world_of(robot)
     return SapienArm(world, "arm"), TreeArm(world.layout, "arm")
-
-
-def start_of(robot: str) -> np.ndarray:
-    return np.array(world_of(robot).layout["arm"].start_qpos)
 
 
 def moved(arm: ArmModel, qpos: np.ndarray) -> np.ndarray:

@@ -44,16 +44,6 @@ def test_joints_that_are_held_are_no_gripper():
     np.testing.assert_allclose(fetch.read().gripper_opening("arm"), [0.3])
 
 
-def test_speed_and_spin_are_norms(env: TaskEnv):
-    for world in worlds_below(env.simulation):
-        world.bodies["cube"].component.set_linear_velocity([0.3, 0.0, 0.4])
-        world.bodies["cube"].component.set_angular_velocity([0.0, 2.0, 0.0])
-    env.simulation.touched()
-    state = state_of(env)
-    np.testing.assert_allclose(state.speed("cube"), [0.5, 0.5], rtol=1e-6)
-    np.testing.assert_allclose(state.spin("cube"), [2.0, 2.0], rtol=1e-6)
-
-
 def test_velocities_are_those_of_the_body_asked_for(env: TaskEnv):
     for world in worlds_below(env.simulation):
         world.bodies["cube"].component.set_linear_velocity([0.0, 0.0, 4.0])
