@@ -14,8 +14,6 @@ from benchmarks.bench.environments import Played
 from benchmarks.bench.measurement import BenchmarkError, Clock, Measurement, Settings
 from benchmarks.bench.report import RECORD, Report, machine, read_report, summary
 from benchmarks.bench.run import BENCHMARKS
-from parity.native import make_native, native_action
-from tests.native import NATIVE
 from tests.quick import quick_cases
 
 TINY = Settings(
@@ -100,21 +98,6 @@ def test_every_benchmark_measures(name, request):
     assert all({*pair} <= {*found.samples} for pair in found.ratios)
     assert {*found.floors} <= {*found.samples}
     assert not multiprocessing.active_children()
-
-
-class TestBesideNative:
-    pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
-
-    def test_both_play_the_same_motion(self):
-        native, ours = make_native("PickCube-v1"), tasks.make("PickCube-v1")
-        played = Played(ours, TINY)
-        for number in (0, 5, 6):
-            native.reset(seed=number)
-            for action in played.actions(number):
-                native.step(native_action(native, action[0]))
-            played.step(number)
-        here = ours.simulation.read().qpos("arm")
-        assert np.array_equal(native.agent.robot.get_qpos().numpy(), here)
 
 
 class TestCommand:

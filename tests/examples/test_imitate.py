@@ -1,6 +1,5 @@
 """The example that learns from an expert's episodes."""
 
-import importlib.util
 import json
 import os
 import pickle
@@ -8,7 +7,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 import torch
@@ -16,9 +14,9 @@ import torch
 pytest.importorskip("matplotlib")
 
 from robot_layouts.data import evaluate
+from tests.examples.learning import EXAMPLES, ROOT, loaded
 
-ROOT = Path(__file__).parent.parent.parent
-EXAMPLE = ROOT / "examples" / "imitate.py"
+EXAMPLE = EXAMPLES / "imitate.py"
 TASK, MODE = "PushCube-v1", "pd_joint_pos"
 WORDS = [TASK, "--episodes", "2", "--steps", "60", "--examined", "1", "--tests", "2"]
 
@@ -27,12 +25,8 @@ pytestmark = pytest.mark.long  # they record and learn
 
 @pytest.fixture(scope="module")
 def example():
-    spec = importlib.util.spec_from_file_location("imitate", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["imitate"] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["imitate"]
+    with loaded("imitate") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")

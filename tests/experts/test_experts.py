@@ -9,23 +9,9 @@ from robot_layouts.experts import find_expert, list_experts, register_expert
 from robot_layouts.experts.registry import EXPERTS
 from robots import TaskError, UnknownNameError
 from tasks.episode import play
-from tests.data.hand_overs import TASK, plan, task
+from tests.data.hand_overs import TASK, plan
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
-
-
-def test_the_cube_changes_hands_in_the_air():
-    """Both grippers hold it at once, higher than it ever lies on the table."""
-    env = task()
-    env.reset(0, options={"reconfigure": True})
-    both = []
-    for action in plan(0):
-        env.step(action)
-        state = env.simulation.read()
-        if all(state.is_grasping(robot, "cube")[0] for robot in ("left", "right")):
-            both.append(float(state.position("cube")[0, 2]))
-    assert both
-    assert min(both) > 0.1
 
 
 @pytest.mark.long

@@ -4,15 +4,12 @@ import html
 import re
 import socket
 import urllib.request
-from types import SimpleNamespace
 from urllib.parse import urlsplit
 
 import pytest
 
-from layouts.viewer import ViewerError
 from layouts.viewer.guard import REFUSAL, Guard
 from layouts.viewer.page import NO_SLIDERS, save_html
-from layouts.viewer.server import serving
 from layouts.viewer.text import as_html, node, printable
 from tests.layouts.guests import (
     WEBSOCKET,
@@ -107,16 +104,6 @@ def test_the_printed_address_opens_wherever_the_server_listens(host, tmp_path):
         assert named == ("[::1]" if ":" in host else "localhost")
 
 
-def test_headers_given_twice_are_refused(open_site):
-    port, path = open_site.port, f"/?token={open_site.token}"
-    own, evil = ("Host", f"127.0.0.1:{port}"), ("Host", f"{EVIL}:{port}")
-    for pairs in ([own, evil], [evil, own], [own, own], [own, ("Origin", f"http://{EVIL}")]):
-        assert ask(port, [*pairs, *WEBSOCKET.items()], path)[0] == 403
-    assert ask(port, [own], f"{path}&token=x")[0] == 403
-    origins = [("Origin", f"http://127.0.0.1:{port}"), ("Origin", f"http://{EVIL}")]
-    assert ask(port, [own, *origins, *WEBSOCKET.items()], path)[0] == 403
-
-
 def test_a_guest_steers_and_others_see_it(open_site):
     page = open_site.page
     with Guest(open_site.address) as steers, Guest(open_site.address) as sees:
@@ -130,26 +117,20 @@ def test_a_guest_steers_and_others_see_it(open_site):
 
 
 def wrong_messages(slider, box):
+    """Of each kind some; `make faults` sends more."""
     update = {"type": "GuiUpdateMessage", "uuid": slider}
-    for value in (float("nan"), float("inf"), -1e300, 1 << 60, "0.5", None, True, [0.5], {}, b"0"):
+    for value in (float("nan"), -1e300, "0.5", None, True, [0.5]):
         yield {**update, "updates": {"value": value}}
-    yield {**update, "updates": {"value": 0.5, "update_cb": []}}
-    for name in ("update_cb", "sync_cb", "gui_api", "removed", "min", "uuid", "__class__"):
-        yield {**update, "updates": {name: 0.5}}
-    for updates in (None, [], "value", 5):
+    for updates in ({"value": 0.5, "update_cb": []}, {"gui_api": 0.5}, None, []):
         yield {**update, "updates": updates}
     yield {"type": "GuiUpdateMessage", "uuid": box, "updates": {"value": 1}}
-    yield {"type": "GuiUpdateMessage", "uuid": [slider], "updates": {"value": 0.5}}
     yield {"type": "GuiUpdateMessage", "uuid": "no such", "updates": {"value": 0.5}}
-    yield {**update, "updates": {"value": 0.5}, "excluded_self_client": 0}
-    yield {"type": "ViewerCameraMessage"}
-    for kind in ("ShareUrlRequest", "ShareUrlDisconnect", "Message", "", None, 5, [], {}):
+    for kind in ("ShareUrlRequest", "ShareUrlDisconnect", "ViewerCameraMessage", None, []):
         yield {"type": kind}
     yield {"type": "RunJavascriptMessage", "source": "alert(1)"}
-    yield {"type": "SetGuiPanelLabelMessage", "label": "owned"}
     start = {"source_component_uuid": slider, "transfer_uuid": "t", "filename": "../x"}
     yield {"type": "FileTransferStartUpload", "mime_type": "x", "part_count": 1, **start}
-    yield from (b"", b"\xc1", b"\x81", b"\x91" * 9000, b"\x81\xa4type\xa1\xff", b"\xff" * 99)
+    yield from (b"", b"\xc1", b"\x91" * 9000, b"\x81\xa4type\xa1\xff")
 
 
 def test_nothing_but_what_the_controls_send_reaches_viser(open_site, monkeypatch):
@@ -221,25 +202,6 @@ def test_a_token_is_new_each_time_and_not_in_what_is_logged():
     assert one.token not in repr(one)
 
 
-def test_a_viser_that_cannot_be_guarded_is_not_served(monkeypatch):
-    import viser.infra._infra as viser_infra
-    from websockets.asyncio.server import ServerConnection, serve
-
-    server = SimpleNamespace(ServerConnection=ServerConnection, serve=serve)
-    real = viser_infra.websockets
-    changed = SimpleNamespace(
-        asyncio=SimpleNamespace(server=server),
-        datastructures=real.datastructures,
-        exceptions=real.exceptions,
-    )
-    monkeypatch.setattr(viser_infra, "websockets", changed)
-    with (
-        pytest.raises(ViewerError, match=r"viser .* would accept any client, so no page is"),
-        serving("127.0.0.1", 0, "cell"),
-    ):
-        pytest.fail("it is served")
-
-
 @pytest.mark.parametrize("name", HOSTILE_NAMES)
 def test_a_name_is_shown_as_it_is(name):
     shown = as_html(name)
@@ -253,19 +215,6 @@ def test_names_make_nodes_of_their_own():
     assert len({node(name) for name in names}) == len(names)
     assert printable("a\nb\x1b[31m\udcff") == r"a\nb\x1b[31m\udcff"
     assert as_html("one\ntwo") == "one<br>two"
-
-
-@pytest.mark.parametrize("name", ["floor", "things", "tables", "WorldAxes", "arm"])
-def test_a_robot_of_any_name_replaces_nothing_of_the_scene(name, tmp_path):
-    from layouts import single
-    from layouts.viewer import ShownCell
-    from tests.layouts.guests import named_robot
-
-    with site(ShownCell("cell", single({name: named_robot(tmp_path)}))) as running:
-        nodes = running.server.scene._handle_from_node_name
-        assert type(nodes["/(floor)"]).__name__ == "GridHandle"
-        assert nodes[f"/{name}"].visible
-        assert f"/{name}/collision/upper" in nodes
 
 
 def test_all_text_of_a_page_is_plain(tmp_path):
@@ -298,13 +247,3 @@ def test_a_saved_page_says_that_it_has_no_sliders_and_shows_names_as_they_are(tm
         assert f".{name}" not in text
     assert text.count("<iframe") == 0
     assert f"arm.base in arm.{html.escape(tip)}, " in text
-
-
-@pytest.mark.parametrize("where", ["folder.html", "file/cell.html", "nul\0.html", "x" * 300])
-def test_a_page_that_cannot_be_written_is_refused(where, tmp_path):
-    (tmp_path / "folder.html").mkdir()
-    (tmp_path / "file").write_text("")
-    name = where if where.endswith(".html") else f"{where}.html"
-    with pytest.raises(ViewerError, match="^cannot write "):
-        save_html(small_cell(tmp_path), tmp_path / name)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder.html", "small.urdf"]

@@ -8,7 +8,6 @@ import signal
 import sys
 import weakref
 from contextlib import closing, contextmanager
-from multiprocessing import util
 from pathlib import Path
 
 import gymnasium
@@ -192,20 +191,6 @@ def in_fork(call):
         answer = pickle.loads(pipe.read())
     os.waitpid(pid, 0)
     return answer
-
-
-def test_a_fork_neither_uses_nor_ends_the_workers_of_a_vector():
-    with vector(2) as env:
-        env.reset(seed=1)
-        for call in (lambda: env.step(ACTION), env.reset, env.restart):
-            error = in_fork(call)
-            assert isinstance(error, SimulationError)
-            assert f"belongs to process {os.getpid()}, of which this one is a fork" in str(error)
-        in_fork(lambda: env.close())
-        in_fork(lambda: vars(env).clear())  # as when the collector comes by
-        in_fork(lambda: util._exit_function())  # what multiprocessing does when Python ends
-        assert in_fork(multiprocessing.active_children) == []
-        assert env.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1]
 
 
 @pytest.mark.long
