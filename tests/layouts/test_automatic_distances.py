@@ -120,11 +120,6 @@ def test_a_robot_that_touches_itself_is_refused(tmp_path):
         side_by_side({"left": folded, "right": "panda"}, spacing="auto")
 
 
-def test_robots_of_the_catalogue_cost_no_check(monkeypatch):
-    monkeypatch.setattr(Layout, "validate", None)
-    assert ring({"a": "panda", "b": "koch"}) == ring({"a": "panda", "b": "koch"})
-
-
 def test_without_fcl_the_distance_is_that_of_reach(tmp_path, monkeypatch):
     robots = {"left": wide(tmp_path), "right": "panda"}
     monkeypatch.setitem(sys.modules, "fcl", None)

@@ -19,13 +19,9 @@ from tests.layouts.test_export_mjcf import small_cell
 from tests.layouts.travelling import draws, outside
 
 NAME = "test_cell"
-CONFIGS = (
-    "joint_limits",
-    "kinematics",
-    "moveit_controllers",
-    "ompl_planning",
-    "ros2_controllers",
-)
+CONFIGS = {
+    *("joint_limits", "kinematics", "moveit_controllers", "ompl_planning", "ros2_controllers")
+}
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +164,7 @@ def test_limbs_have_groups_of_their_own(tmp_path):
 
 def test_configurations_name_what_there_is(package, srdf, expanded):
     read = {name: config(package, name) for name in CONFIGS}
-    assert {path.stem for path in (package / "config").glob("*.yaml")} == set(CONFIGS)
+    assert {path.stem for path in (package / "config").glob("*.yaml")} == CONFIGS
     moving = {
         joint.get("name")
         for joint in expanded.findall("joint")

@@ -8,12 +8,13 @@ import pytest
 import tasks
 from layouts import single
 from robot_layouts.simulation import Box, Camera, Simulation, World
-from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backdrop import LAYERED
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.studio import Studio
 from robot_layouts.simulation.scene.cameras import SHADERS
 from tests.quick import quick_cases
+
+pytestmark = pytest.mark.usefixtures("drawn")
 
 CAMERAS = {
     "front": Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1), "front", 61, 47),
@@ -23,13 +24,6 @@ CAMERAS = {
 RED, GREEN, GLASS = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.5)
 HALF = (0.05, 0.05, 0.05)
 PLACE = (-0.1, 0.0, 0.05)
-
-
-@pytest.fixture(autouse=True)
-def drawn(renderer) -> None:
-    """Skip where nothing can be drawn."""
-    if problem := vulkan_problem():
-        pytest.skip(problem)
 
 
 def built(*colors, kinds=("static", "dynamic"), apart: float = 0.2) -> Simulation:

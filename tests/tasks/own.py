@@ -1,12 +1,16 @@
-"""What tests of this project's own tasks share: bodies put where success is told from."""
+"""What tests of tasks share: bodies put where success is told from, and a short recording."""
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 import tasks
+from robot_layouts.data.recording.recorder import Recorder
 from tasks import TaskEnv
+from tasks.episode import play
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
@@ -41,6 +45,17 @@ def told(env: TaskEnv, flags: str, scenes: Iterable[dict[str, Any]]) -> list[lis
         info = look(env)
         found.append([info[flag].item() for flag in flags.split()])
     return found
+
+
+def recorded(task_id: str, folder: Path) -> Path:
+    """Record two episodes of random actions."""
+    path, random = folder / "trajectory.h5", np.random.default_rng(0)
+    task = tasks.make(task_id, obs_mode="none")
+    with Recorder(path, task) as recorder:
+        for seed in (3, 5):
+            actions = random.uniform(-1, 1, (20, task.layout.action_dim)).astype(np.float32)
+            recorder.add(play(task, seed, actions))
+    return path
 
 
 def look(env: TaskEnv) -> dict[str, torch.Tensor]:

@@ -16,7 +16,7 @@ import tasks
 from robot_layouts.simulation import Camera
 from robots import RobotLayoutsError, RobotRegistry, SimulationError, TaskError
 from tasks.engine.cameras import cameras_again, describe_cameras, load_cameras
-from tests.tasks.test_cameras import drawing, drawn, seen  # noqa: F401
+from tests.tasks.test_cameras import drawing, seen
 
 TASK = "PickCube-v1"
 EYE, TARGET = (0.3, 0.0, 0.6), (-0.1, 0.0, 0.1)

@@ -10,19 +10,12 @@ from gymnasium.utils.env_checker import check_env
 
 import tasks
 from robot_layouts.simulation import Camera
-from robot_layouts.simulation.rendering import Observers, vulkan_problem
+from robot_layouts.simulation.rendering import Observers
 from robots import TaskError
 from tests.fresh_process import in_fresh_process
 
 TASK = "PickCube-v1"
 SMALL = [Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1), width=48, height=32)]
-
-
-@pytest.fixture
-def drawn(renderer) -> None:
-    """Skip where nothing can be drawn."""
-    if problem := vulkan_problem():
-        pytest.skip(problem)
 
 
 drawing = pytest.mark.usefixtures("drawn")

@@ -11,11 +11,9 @@ import pytest
 import torch
 
 import tasks
-from layouts import Layout, Placement
 from parity.episodes import random_episodes
 from parity.lockstep import HISTORIES, NativeSide
 from robot_layouts.data.playing.mode_conversion import converted_steps
-from robot_layouts.simulation import PhysicsSettings, Simulation
 from robots import (
     CONTROL_MODES,
     ActionError,
@@ -30,6 +28,8 @@ from tasks.registry import make_scenario
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
 from tests.quick import quick_cases
+from tests.simulation.test_tcp_control import alone
+from tests.tasks.test_native_cameras import leaves
 
 SAMPLE = (
     ("TwoRobotPickCube-v1", "pd_joint_pos"),
@@ -105,21 +105,6 @@ class TestNative:
             assert list(found) == list(expected)
             assert all(torch.equal(found[name], expected[name]) for name in found)
         native.close()
-
-
-def leaves(tree, above=""):
-    found = {}
-    for name, value in tree.items():
-        inner = hasattr(value, "items")
-        found |= leaves(value, f"{above}{name}/") if inner else {f"{above}{name}": value}
-    return found
-
-
-def alone(robot, mode):
-    layout = Layout({"arm": Placement(robot)}).in_control_mode(mode)
-    simulation = Simulation(layout, lambda world, _: None, 1, PhysicsSettings())
-    simulation.worlds[0].stand("arm", layout["arm"].start_qpos)
-    return simulation
 
 
 # -- targets -------------------------------------------------------------------------------------

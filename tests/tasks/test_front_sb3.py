@@ -8,7 +8,6 @@ import pytest
 
 import tasks
 from robot_layouts.experts import find_expert
-from robot_layouts.simulation.rendering import vulkan_problem
 from robots import (
     ActionError,
     MissingPackageError,
@@ -174,9 +173,7 @@ def test_their_own_checks_of_single_environments(task_id):
 
 
 @pytest.mark.long
-def test_images_are_learned_from():
-    if problem := vulkan_problem():
-        pytest.skip(problem)
+def test_images_are_learned_from(drawn):
     env = make(num_envs=2, obs_mode="rgb", timeout=None)
     assert env.reset()["sensor_data/base_camera/rgb"].dtype == np.uint8
     model = PPO("MultiInputPolicy", env, n_steps=2, batch_size=4, n_epochs=1, device="cpu")

@@ -52,16 +52,6 @@ def test_a_users_own_layout_is_checked_as_another_one_is():
     Crowded(replace(Crowded.scenario, layout=FreeRobots.layout)).close()
 
 
-def test_the_own_layout_of_a_task_of_this_library_costs_nothing(monkeypatch):
-    def fail(layout, table):
-        raise AssertionError("checked")
-
-    monkeypatch.setattr("tasks.engine.env.refuse_collisions", fail)
-    tasks.make(TWO).close()
-    with pytest.raises(AssertionError, match="checked"):
-        tasks.make(TWO, layout=crowded())
-
-
 def test_without_fcl_it_warns_with_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "fcl", None)
     layout = face_to_face(PANDAS, spacing=1.37)

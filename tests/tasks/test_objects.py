@@ -8,9 +8,7 @@ from layouts import single
 from objects import ObjectRegistry
 from robot_layouts.__main__ import main
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts.obstacles import _obstacle
-from robot_layouts.simulation.rendering import vulkan_problem
 from robots import DescriptorError, TaskError, UnknownNameError
 from tasks import (
     Area,
@@ -23,8 +21,8 @@ from tasks import (
     add_object,
     register_task,
 )
-from tasks.episode import play
 from tasks.view import body_parts
+from tests.tasks.own import recorded
 
 ID = "TestSetTheTable-v1"
 
@@ -51,14 +49,7 @@ def _registered():
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    task = tasks.make(ID, obs_mode="none")
-    random = np.random.default_rng(0)
-    path = tmp_path_factory.mktemp("objects") / "trajectory.h5"
-    with Recorder(path, task) as recorder:
-        for seed in (3, 5):
-            actions = random.uniform(-1, 1, (20, task.layout.action_dim)).astype(np.float32)
-            recorder.add(play(task, seed, actions))
-    return path
+    return recorded(ID, tmp_path_factory.mktemp("objects"))
 
 
 def test_things_lie_where_episodes_begin_with_them_and_stay_there():
@@ -130,9 +121,7 @@ def test_pages_and_motions_know_the_parts():
         assert np.ptp(corners, axis=0) == pytest.approx(thing.extent, rel=0.01)
 
 
-def test_a_pattern_covers_it_in_pictures(renderer):
-    if problem := vulkan_problem():
-        pytest.skip(problem)
+def test_a_pattern_covers_it_in_pictures(drawn):
     checker = Texture(kinds=("checker",), cells=Fixed(4))
     pictures: list[np.ndarray] = []
     for varied in (None, Randomization(textures={"pot": checker})):

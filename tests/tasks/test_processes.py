@@ -17,7 +17,6 @@ import pytest
 import tasks
 from robot_layouts.core.processes.transport import packed
 from robot_layouts.core.processes.worker import Status, Worker
-from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
@@ -194,9 +193,7 @@ def in_fork(call):
 
 
 @pytest.mark.long
-def test_pictures_in_a_fork_are_refused_in_the_place_of_a_hang():
-    if problem := vulkan_problem():
-        pytest.skip(problem)
+def test_pictures_in_a_fork_are_refused_in_the_place_of_a_hang(drawn):
     with closing(tasks.make(TASK, render_mode="rgb_array")) as env:
         picture = env.render()
         rebuild = {"reconfigure": True}

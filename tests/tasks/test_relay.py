@@ -68,13 +68,6 @@ def test_each_zone_is_in_reach_of_both(layout: Layout):
             assert 0.6 <= share <= FARTHEST_REACH
 
 
-def test_zones_follow_a_layout_that_is_moved():
-    layout = mixed(5)
-    moved = layout.moved((1.0, -2.0, 0.0), yaw=np.pi / 2)
-    expected = [(1.0 - y, -2.0 + x) for x, y in find_zones(layout)]
-    np.testing.assert_allclose(find_zones(moved), expected, atol=1e-9)
-
-
 def test_robots_too_far_apart_are_named():
     with pytest.raises(TaskError, match="'robot0' and 'robot1' stand 1.73 m apart.*Move them"):
         tasks.make(TASK, layout=mixed(3, 1.0))

@@ -16,7 +16,7 @@ from robot_layouts.simulation import Simulation
 from robot_layouts.simulation.checks.overlaps import empty, stand
 from robots import RobotLayoutsError
 from tests.motions import touching_episode
-from tests.tasks.test_cameras import drawing, drawn  # noqa: F401
+from tests.tasks.test_cameras import drawing
 
 TASK = "PickCube-v1"
 FINGERS = ("panda_leftfinger", "panda_rightfinger")

@@ -107,27 +107,6 @@ def test_workers_change_nothing(mode):
         assert env.metadata["autoreset_mode"] is mode
 
 
-def test_an_ended_environment_stands_still_while_others_move(monkeypatch):
-    env = make()
-    simulation = env._backend.batches[0]._task.simulation
-    moved, step = [], simulation.step
-
-    def spy(action, joint_positions, env_ids=None):
-        moved.append([*(range(NUM_ENVS) if env_ids is None else env_ids)])
-        step(action, joint_positions, env_ids)
-
-    monkeypatch.setattr(simulation, "step", spy)
-    action = np.zeros((NUM_ENVS, 8), np.float32)
-    env.reset(seed=0)
-    for _ in range(20):
-        env.step(action)
-    env.reset(options={"reset_mask": LATER})
-    for _ in range(32):
-        env.step(action)
-    assert moved[-3:] == [[0, 1, 2], [1], [0, 1, 2]]
-    assert env.step(action)[4]["elapsed_steps"].tolist() == [2, 33, 2]
-
-
 @pytest.mark.parametrize("ignored", [False, True])
 def test_terminations_may_be_ignored(ignored):
     env = make(ignore_terminations=ignored, autoreset_mode="SAME_STEP")
