@@ -17,7 +17,6 @@ from robots import (
     RobotDescriptor,
     RobotRegistry,
     SimulationError,
-    UnknownNameError,
 )
 from robots.descriptor import ActionSplit
 
@@ -33,25 +32,6 @@ def stand(simulation: Simulation) -> None:
     for world in simulation.worlds:
         for name, placement in world.layout.items():
             world.stand(name, placement.start_qpos)
-
-
-def test_names_are_unique_and_unknown_ones_are_refused():
-    world = World(single({"arm": "panda"}))
-    world.add("cube", Box(half_size=(HALF,) * 3))
-    with pytest.raises(SimulationError, match="already has a body called 'cube'"):
-        world.add("cube", Sphere(radius=HALF))
-    with pytest.raises(UnknownNameError, match="Did you mean 'cube'"):
-        world.set_pose("cub", (0, 0, 0))
-    with pytest.raises(
-        UnknownNameError, match="link of panda 'panda_hnd'. Did you mean 'panda_hand'"
-    ):
-        BuiltWorld(world.layout).robots["arm"].link("panda_hnd")
-    with pytest.raises(SimulationError, match="position of body .*; it must be 3 finite"):
-        world.set_pose("cube", (0, 0))
-    with pytest.raises(SimulationError, match="qpos of robot 'arm' .*; it must be 9 finite"):
-        world.stand("arm", np.zeros(7))
-    with pytest.raises(UnknownNameError, match="Did you mean 'arm'"):
-        world.stand("arn", np.zeros(9))
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,6 @@
 The device is the processor, where the same kernels run, but for how they are shared out.
 """
 
-import gc
-import sys
 from contextlib import closing
 
 import gymnasium
@@ -17,7 +15,7 @@ import tasks
 from robot_layouts.experts import find_expert
 from robots import ActionError, SimulationError, TaskError, UnknownNameError
 from tasks import Randomization, Uniform
-from tasks.interfaces.device import DeviceTask, chosen
+from tasks.interfaces.device import DeviceTask
 
 TASK = "PushCube-v1"
 STEPS = 4  # of an episode
@@ -71,19 +69,6 @@ def test_a_card_that_is_not_there_is_named():
 def test_a_task_itself_is_not_made_on_a_device():
     with pytest.raises(TaskError, match=r"gymnasium.make_vec\('RobotLayouts/…'"):
         tasks.make(TASK, simulator="mujoco_warp")
-
-
-def test_starts_are_chosen_by_seed_and_episode_alone():
-    seeds, episodes = torch.arange(4000).repeat(2), torch.arange(2).repeat_interleave(4000)
-    rows = chosen(seeds, episodes, 100)
-    assert torch.equal(rows, chosen(seeds, episodes, 100))
-    assert torch.equal(rows[5:6], chosen(seeds[5:6], episodes[5:6], 100))
-    counts = torch.bincount(rows, minlength=100)
-    assert len(counts) == 100
-    assert counts.min() > 40  # of 80 on the average
-    assert counts.max() < 130
-    again = (rows[:4000] == rows[4000:]).float().mean()
-    assert 0.0 < again < 0.03  # one in a hundred by chance
 
 
 # -- episodes -------------------------------------------------------------------------------------
@@ -156,32 +141,6 @@ def test_equal_seeds_give_equal_bits_wherever_they_are(engine):
     assert torch.equal(alone, played([11, 5, 6], 3))
     assert torch.equal(alone, played([11, 8], 2))
     assert not torch.equal(alone, played([12, 5, 6], 3))
-
-
-@pytest.mark.long
-def test_a_step_calls_as_much_python_for_many_worlds_as_for_two(engine):
-    def calls(count):
-        counted = 0
-
-        def note(frame, event, argument):
-            nonlocal counted
-            counted += event in ("call", "c_call")
-
-        with closing(made("NEXT_STEP", count, "PickCube-v1")) as env:
-            env.reset(seed=0)
-            for _ in range(3):
-                env.step(torch.zeros(env.action_space.shape))
-            action = torch.zeros(env.action_space.shape)
-            gc.disable()  # which calls what others have asked it to call
-            sys.setprofile(note)
-            try:
-                env.step(action)
-            finally:
-                sys.setprofile(None)
-                gc.enable()
-        return counted
-
-    assert calls(2) == calls(7)
 
 
 @pytest.mark.long

@@ -64,31 +64,6 @@ def test_an_unknown_field_raises():
         tasks.make("PickCube-v1", num_environments=3)
 
 
-@pytest.mark.parametrize(
-    ("fields", "message"),
-    [
-        ({"num_envs": 0}, "num_envs is 0"),
-        ({"num_envs": 1.5}, "num_envs is 1.5"),
-        ({"obs_mode": "rgbb"}, "unknown obs_mode 'rgbb'. Did you mean 'rgb'"),
-        ({"obs_mode": "rgb+normals"}, "any of rgb, depth, segmentation, position, normal, albedo"),
-        ({"obs_mode": "rgbd+state"}, "are joined by '.', and state or state_dict to them"),
-        ({"reward_mode": "dens"}, "reward_mode 'dens' is not offered.*'dense'"),
-        ({"control_mode": "pd_ee_dance"}, "control_mode 'pd_ee_dance' is not offered"),
-        (
-            {"simulator": "mujico"},
-            "simulator 'mujico' is not offered; choices: 'sapien3', 'mujoco', 'mujoco_warp'",
-        ),
-        ({"headless": False}, "headless=False is not offered"),
-        ({"cameras": ["base"]}, "cameras has a str; simulation.Camera is needed"),
-        ({"physics": 3}, "physics is a int"),
-        ({"layout": single({"hand": "panda"})}, r"places \['arm'\]; the layout has \['hand'\]"),
-    ],
-)
-def test_what_a_task_does_not_offer_is_said(fields: dict[str, object], message: str):
-    with pytest.raises(TaskError, match=message):
-        tasks.make("PickCube-v1", **fields)
-
-
 def test_one_place_takes_a_bare_name_and_two_do_not():
     assert tasks.make("PickCube-v1", robots="panda_wristcam").layout["arm"].robot.name == (
         "panda_wristcam"
