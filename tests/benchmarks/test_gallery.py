@@ -11,10 +11,7 @@ import pytest
 from benchmarks.__main__ import main
 from benchmarks.gallery import pages as gallery
 from benchmarks.gallery.pages import FOLDER, _read, all_pages, complaints, solved
-from benchmarks.gallery.pictures import (
-    LARGEST_CLIP,
-    LARGEST_PORTRAIT,
-)
+from benchmarks.gallery.pictures import LARGEST_CLIP, LARGEST_PORTRAIT
 from benchmarks.records import RecordError
 from robots.registry import CATALOGUE as ROBOTS
 from tasks.registry import CATALOGUE as TASKS

@@ -10,15 +10,8 @@ import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.robots import survey as survey_module
-from benchmarks.robots.judge import (
-    EXPECTED,
-    expected_of,
-    read_expectations,
-)
-from benchmarks.robots.survey import (
-    Robot,
-    probe,
-)
+from benchmarks.robots.judge import EXPECTED, expected_of, read_expectations
+from benchmarks.robots.survey import Robot, probe
 from tests.three_links import arm, save
 
 RECORD = Path(__file__).parents[2] / "docs" / "robots.json"

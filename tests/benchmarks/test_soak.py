@@ -6,9 +6,7 @@ from io import StringIO
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.soak import (
-    growth,
-)
+from benchmarks.soak import growth
 from tasks import register_task
 from tests.data import leaking_tasks
 from tests.fresh_process import in_fresh_process

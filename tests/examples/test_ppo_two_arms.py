@@ -13,13 +13,7 @@ pytest.importorskip("matplotlib")
 import tasks
 from robot_layouts.data import evaluate
 from robot_layouts.data.playing.policies import find_policy
-from tests.examples.learning import (
-    assert_same,
-    examples,
-    finish,
-    kill_while_it_learns,
-    start,
-)
+from tests.examples.learning import assert_same, examples, finish, kill_while_it_learns, start
 
 __all__ = ["examples"]
 

@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 from robot_layouts.kinematics.rotations import rotation_about, rotation_vector
-from robot_layouts.kinematics.solve import (
-    NEAR_ENOUGH,
-    IkGoal,
-    approach,
-    farthest,
-    scattered,
-    solve,
-)
+from robot_layouts.kinematics.solve import NEAR_ENOUGH, IkGoal, approach, farthest, scattered, solve
 from robots import RobotRegistry
 from tests.catalogue import every_robot
 from tests.kinematics.robots_of_the_catalogue import random_qpos, tree_of

@@ -10,13 +10,7 @@ import pytest
 
 import tasks
 from layouts import Layout, Placement, face_to_face
-from robots import (
-    CONTROL_MODES,
-    DescriptorError,
-    LayoutError,
-    RobotRegistry,
-    UnknownNameError,
-)
+from robots import CONTROL_MODES, DescriptorError, LayoutError, RobotRegistry, UnknownNameError
 
 DELTAS, POSE = "pd_joint_delta_pos", "pd_ee_delta_pose"
 PAIR = face_to_face({"left": "panda_wristcam", "right": "panda_wristcam"}, spacing=1.5)

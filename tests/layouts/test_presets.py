@@ -8,15 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from layouts import (
-    around_table,
-    face_to_face,
-    grid,
-    ring,
-    side_by_side,
-    single,
-    yaw_quaternion,
-)
+from layouts import around_table, face_to_face, grid, ring, side_by_side, single, yaw_quaternion
 from layouts.distances import HAND_OVER, ROUND_CORNERS
 from layouts.frames import EDGES, table_outlines
 from layouts.presets import PRESETS

@@ -6,17 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from layouts import (
-    Layout,
-    Placement,
-    around_table,
-    ceiling,
-    face_to_face,
-    grid,
-    ring,
-    single,
-    wall,
-)
+from layouts import Layout, Placement, around_table, ceiling, face_to_face, grid, ring, single, wall
 from layouts.preview import WIDTH, draw
 from robot_layouts.core.figures import DOTS_PER_INCH, SUPPORTED
 from robots import LayoutError, MissingPackageError

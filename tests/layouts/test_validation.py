@@ -8,36 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from layouts import (
-    Layout,
-    Placement,
-    around_table,
-    side_by_side,
-    yaw_quaternion,
-)
+from layouts import Layout, Placement, around_table, side_by_side, yaw_quaternion
 from layouts.frames import Pose
-from layouts.validation.collisions import (
-    nearest,
-    stand,
-    touching,
-)
-from robots import (
-    LayoutError,
-    MissingPackageError,
-    RobotRegistry,
-    UnknownNameError,
-)
+from layouts.validation.collisions import nearest, stand, touching
+from robots import LayoutError, MissingPackageError, RobotRegistry, UnknownNameError
 from robots.bodies.hulls import load_model
 from tests.catalogue import every_robot
-from tests.layouts.small_robots import (
-    FOLDING,
-    folding,
-    joint,
-    link,
-    robot,
-    turntable,
-    urdf,
-)
+from tests.layouts.small_robots import FOLDING, folding, joint, link, robot, turntable, urdf
 
 PANDAS = {"left": "panda", "right": "panda"}
 TURN = joint("turn", "base", "top", xyz="0 0 0.35")

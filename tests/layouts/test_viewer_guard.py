@@ -11,13 +11,7 @@ import pytest
 from layouts.viewer.guard import REFUSAL, Guard
 from layouts.viewer.page import NO_SLIDERS, save_html
 from layouts.viewer.text import as_html, node, printable
-from tests.layouts.guests import (
-    WEBSOCKET,
-    Guest,
-    ask,
-    site,
-    small_cell,
-)
+from tests.layouts.guests import WEBSOCKET, Guest, ask, site, small_cell
 from tests.layouts.hostile_names import HOSTILE_NAMES
 from tests.pages import wait_until
 

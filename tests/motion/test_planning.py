@@ -13,13 +13,7 @@ from robot_layouts.motion.model.obstacles import Track, box
 from robots import UnknownNameError
 from robots.urdf.tcp import find_tcp
 from tests.fresh_process import in_fresh_process
-from tests.motion.two_pandas import (
-    DOWN,
-    aside,
-    cell,
-    in_the_middle,
-    turned,
-)
+from tests.motion.two_pandas import DOWN, aside, cell, in_the_middle, turned
 
 
 def a_post():

@@ -12,12 +12,7 @@ from objects.shapes import Box, ConvexHull, Friction
 from objects.solids import bounds, sampled, surface
 from robot_layouts.__main__ import main
 from robot_layouts.simulation import Simulation
-from robot_layouts.simulation.checks.objects import (
-    OPENINGS,
-    RestTrial,
-    try_rests,
-    try_thing_grasps,
-)
+from robot_layouts.simulation.checks.objects import OPENINGS, RestTrial, try_rests, try_thing_grasps
 
 FEWEST_GRASPS = 20
 GRASPED = [name for name in CATALOGUE if ObjectRegistry.load(name).grasps]

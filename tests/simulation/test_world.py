@@ -12,12 +12,7 @@ from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.blueprint import read_blueprint
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.world import WorldBody
-from robots import (
-    DescriptorError,
-    RobotDescriptor,
-    RobotRegistry,
-    SimulationError,
-)
+from robots import DescriptorError, RobotDescriptor, RobotRegistry, SimulationError
 from robots.descriptor import ActionSplit
 
 HALF = 0.02

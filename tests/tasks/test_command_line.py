@@ -7,11 +7,7 @@ import pytest
 import tasks
 from robot_layouts.__main__ import main
 from robots import TaskError
-from tasks.description import (
-    facts,
-    parity_verdicts,
-    read_docstring,
-)
+from tasks.description import facts, parity_verdicts, read_docstring
 from tasks.registry import CATALOGUE
 from tests.quick import quick_cases
 

@@ -8,13 +8,7 @@ import pytest
 
 import tasks
 from robot_layouts.experts import find_expert
-from robots import (
-    ActionError,
-    MissingPackageError,
-    SimulationError,
-    TaskError,
-    UnknownNameError,
-)
+from robots import ActionError, MissingPackageError, SimulationError, TaskError, UnknownNameError
 
 pytest.importorskip("stable_baselines3")
 
@@ -22,11 +16,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.torch_layers import NatureCNN
-from stable_baselines3.common.vec_env import (
-    DummyVecEnv,
-    VecMonitor,
-    VecNormalize,
-)
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 TASK = "PushCube-v1"
 NUM_ENVS, STEPS = 3, 55  # an episode has 50

@@ -11,16 +11,7 @@ from numpy.typing import NDArray
 
 import tasks
 from robots import TaskError, UnknownNameError
-from tasks import (
-    Fixed,
-    LogUniform,
-    MultiRobotTask,
-    Normal,
-    Randomization,
-    Shift,
-    Uniform,
-    Whole,
-)
+from tasks import Fixed, LogUniform, MultiRobotTask, Normal, Randomization, Shift, Uniform, Whole
 
 MASS = Randomization(mass={"cube": LogUniform(0.5, 2.0), "arm.*": Uniform(0.9, 1.1)})
 
