@@ -15,6 +15,7 @@ from benchmarks.objects import NAMES, digest_of, kind_of
 from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
 from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
+from benchmarks.robots.judge import EXPECTED, expected_of, read_expectations
 from objects import ObjectRegistry
 from objects.registry import CATALOGUE
 from robot_layouts.data.receipts import Receipt
@@ -79,6 +80,18 @@ def test_a_record_is_read_as_it_was_written(tmp_path):
     assert read_record(tmp_path / "none.json", tasks={}) == {"tasks": {}}
     with pytest.raises(RecordError, match=r"cannot read .*a\.json: KeyError\('runs'\)"):
         read_record(tmp_path / "a.json", runs={})
+
+
+def test_every_robot_of_the_survey_is_known_with_its_joints():
+    expectations = read_expectations(EXPECTED)
+    for key, seen in record("robots")["robots"].items():
+        expected = expected_of(key, expectations)
+        assert expected.kind != "unknown", key
+        groups = seen.get("loads", {}).get("groups", {})
+        joints = [joint for group in groups.values() for joint in group["joints"]]
+        for limb in expected.arms.values() if joints else ():
+            for pattern in (*limb.joints, *limb.gripper):
+                assert any(Path(joint).match(pattern) for joint in joints), (key, pattern)
 
 
 def test_what_the_page_of_objects_promises():

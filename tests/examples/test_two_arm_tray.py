@@ -53,25 +53,3 @@ def expect_results(names: dict) -> None:
     assert names["summary"].recorded == 2
     tray = names["played"].states["actors"]["tray"]
     assert (tray == names["episodes"][0].states["actors"]["tray"]).all()
-
-
-@pytest.mark.long
-def test_a_notebook_runs_it_from_the_first_to_the_last_cell(tmp_path):
-    nbformat = pytest.importorskip("nbformat")
-    nbclient = pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
-    nbclient.NotebookClient(
-        notebook, timeout=600, resources={"metadata": {"path": tmp_path}}
-    ).execute()
-    shown = {}
-    for cell in notebook.cells:
-        for output in cell.get("outputs", ()):
-            assert output["output_type"] != "error"
-            shown.update(
-                {kind: shown.get(kind, "") + text for kind, text in output.get("data", {}).items()}
-            )
-    assert "<svg" in shown["text/html"]  # the task's layout
-    assert "arm.panda_joint1" in shown["text/html"]  # the robot's numbers
-    assert "4 of 4 episodes with success" in shown["text/plain"]
-    assert "is defined in this notebook or interactive session" in shown["text/plain"]

@@ -29,7 +29,7 @@ from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, complaints, pair
 from tests.quick import quick_cases
 from tests.simulation.test_tcp_control import alone
-from tests.tasks.test_native_cameras import leaves
+from tests.tasks.test_native_camera_settings import leaves
 
 SAMPLE = (
     ("TwoRobotPickCube-v1", "pd_joint_pos"),
