@@ -56,18 +56,6 @@ def report_of(*measurements):
     return Report(measurements, machine(), str(Clock()), (0.5, 1.25))
 
 
-class TestFigures:
-    def test_medians_and_medians_of_ratios(self):
-        assert NUMBERS.median("step", 1) == 3.0
-        assert NUMBERS.ratio("step", "physics", 1) == 2.5  # of 3, 1, 2.5; not 3 / 2
-        assert NUMBERS.quartiles("step", 1) == (2.5, 6.5)
-        assert NUMBERS.quartiles("step", 2) is None
-
-    def test_what_was_not_measured_is_a_dash(self):
-        assert NAMES.headings() == ["task", "here", "native", "native / here"]
-        assert list(NAMES.rows()) == [["A-v1", "1.50", "4.00", "2.67"], ["B-v1", "2.00", "–", "–"]]
-
-
 class TestWhatIsTimed:
     def test_a_step_and_the_physics_alone_are_the_same_motion(self):
         played = Played(tasks.make("PickCube-v1", num_envs=2), replace(TINY, steps=10))

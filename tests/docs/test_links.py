@@ -83,10 +83,7 @@ def test_the_readme_declares_the_tutorials_task():
     ("html", "address"),
     [
         ('<a href="https://example.org">', ""),
-        ('<img src="data:image/png;base64,AA==">', ""),
         ('<link rel="canonical" href="https://example.org">', ""),
-        ('<link href="a.css" rel="stylesheet">', ""),
-        ('<script src="https://example.org/a.js"></script>', "https://example.org/a.js"),
         ('<link rel="stylesheet" href="//example.org/a.css">', "//example.org/a.css"),
         ("<img alt=a src=http://example.org/a.png>", "http://example.org/a.png"),
     ],

@@ -145,20 +145,6 @@ def test_episodes_are_those_of_an_evaluation(env, played, plan):
         assert expected[seed].total == pytest.approx(total, rel=1e-12)
 
 
-@pytest.mark.long
-def test_nothing_stays_of_what_was_played_before(plan):
-    """Contacts that PhysX remembers would show in the last bits: worlds are rebuilt."""
-    with closing(make(num_envs=1)) as used, closing(make(num_envs=1)) as fresh:
-        used.reset(seed=[SEEDS[0]], options=THEIRS)
-        for action in plan_of(SEEDS[0]):
-            used.step(action[None])
-        for vector in (used, fresh):
-            vector.reset(seed=[SEEDS[SOLVED]], options=THEIRS)
-        for action in plan:
-            one, other = (vector.step(action[None])[0] for vector in (used, fresh))
-            assert all(np.array_equal(one[name], other[name]) for name in one)
-
-
 def test_films_are_black_where_nothing_is_drawn(env):
     pictures = env.call("render")
     assert len(pictures) == 3

@@ -162,16 +162,12 @@ def test_cameras_see_those_that_are_there() -> None:
         (lambda: Distractors(count=Whole(0, 3), kind="solid"), "static"),  # pyright: ignore[reportArgumentType]
         (lambda: Distractors(count=Whole(0, 3), gap=-1.0), "gap"),
         (lambda: Randomization.from_json({"distractors": {"cout": 3}}), "count"),
+        (lambda: Randomization.from_json({"distractors": {}}), "distractors lacks count; it takes"),
     ],
 )
 def test_what_cannot_be_is_refused(wrong: Callable[[], Any], message: str) -> None:
     with pytest.raises((TaskError, UnknownNameError), match=message):
         wrong()
-
-
-def test_a_file_has_to_say_how_many() -> None:
-    with pytest.raises(TaskError, match="distractors lacks count; it takes a Distractors"):
-        Randomization.from_json({"distractors": {}})
 
 
 def test_they_are_written_and_read() -> None:
