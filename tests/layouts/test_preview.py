@@ -100,12 +100,6 @@ def test_other_formats(suffix, start, tmp_path):
     assert {suffix} < set(SUPPORTED)
 
 
-@pytest.mark.parametrize("table", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, math.nan, 1)])
-def test_a_table_that_is_no_rectangle(table, tmp_path):
-    with pytest.raises(LayoutError, match="must be x_min, y_min, x_max, y_max|takes 4 finite"):
-        LAYOUTS["two"].preview(tmp_path / "cell.png", table=table)
-
-
 @pytest.mark.parametrize("name", ["cell.jpg", "cell", "cell.png.txt"])
 def test_an_unsupported_ending_names_the_supported_ones(name, tmp_path):
     with pytest.raises(LayoutError, match=rf"'{name}'; the name must end in .png, .pdf or .svg"):

@@ -89,10 +89,7 @@ def test_a_saved_page_shows_the_robots_and_asks_for_nothing(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "names",
-    [("127.0.0.1",), ("127.0.0.1", "localhost", EVIL)],
-)
+@pytest.mark.parametrize("names", [("127.0.0.1",), ("127.0.0.1", "localhost", EVIL)])
 def test_only_the_page_with_the_token_steers(names):
     rebound = f"--host-resolver-rules=MAP {EVIL} 127.0.0.1"
     with (

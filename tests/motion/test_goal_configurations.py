@@ -1,10 +1,9 @@
 """Goals that take a longer search: postures that are not met with at first."""
 
 import numpy as np
-import pytest
 
 from layouts import single
-from robot_layouts.motion import NoPlanError, TcpGoal, plan
+from robot_layouts.motion import TcpGoal, plan
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.clearances import Clearances
 from robot_layouts.motion.model.obstacles import box
@@ -42,13 +41,6 @@ def test_postures_of_a_longer_search_let_goals_agree():
     )
     assert np.array_equal(end[right.moving], elsewhere[0])
     assert any(np.array_equal(end[left.moving], posture) for posture in left.candidates)
-
-
-def test_goals_that_exclude_each_other_are_named():
-    whole = Cell(cell())
-    left, right, start = meeting(whole, others=np.empty((0, 7)))
-    with pytest.raises(NoPlanError, match="goals of left and right exclude each other"):
-        find_goal_configurations([left, right], Clearances(whole, whole.robots, 0.01), start, 0.0)
 
 
 def test_an_obstacle_is_avoided_by_a_posture_of_a_longer_search():

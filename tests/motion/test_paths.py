@@ -82,12 +82,6 @@ def test_velocities_are_scaled_and_accelerations_follow_them():
     assert given["right"].tolist() == [3.0] * 9
 
 
-@pytest.mark.parametrize("factor", [0.0, 1.5, "fast"])
-def test_a_factor_that_makes_no_sense_is_refused(factor):
-    with pytest.raises(MotionError, match="velocity is"):
-        largest_velocities(cell(), factor=factor)
-
-
 def test_an_acceleration_that_makes_no_sense_is_refused():
     with pytest.raises(MotionError, match="positive number"):
         largest_accelerations(cell(), largest_velocities(cell()), {"left": [1.0, 2.0]})

@@ -146,11 +146,7 @@ def test_who_is_there_already_stays():
     [
         ({"left": TcpGoal((0, 3, 0.3))}, "unreachable", r"stays 2\.\d+ m away"),
         ({"left": [9.0, 0, 0, -1, 0, 1, 0]}, "unreachable", "panda_joint1 at 9, beyond its limits"),
-        (
-            {"left": TcpGoal((0.0, 0.6, 0.3), DOWN)},
-            "unreachable",
-            "does not get to its goal",
-        ),
+        ({"left": TcpGoal((0.0, 0.6, 0.3), DOWN)}, "unreachable", "does not get to its goal"),
         (
             {"left": in_the_middle(), "right": in_the_middle()},
             "goal in collision",

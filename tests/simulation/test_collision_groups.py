@@ -157,9 +157,7 @@ def test_links_of_two_robots_collide_whatever_each_allows(tmp_path):
     assert frozenset({"l0", "l2"}) in touching
 
 
-def test_a_robot_that_says_nothing_keeps_the_groups_of_native_s_loader(
-    tmp_path,
-):
+def test_a_robot_that_says_nothing_keeps_the_groups_of_native_s_loader(tmp_path):
     urdf = tmp_path / "toy.urdf"
     urdf.write_text(toy())
     urdf.with_suffix(".srdf").write_text(

@@ -150,14 +150,6 @@ def test_a_wrong_action_moves_nothing():
     assert torch.equal(env.step(action)[0], other.step(action)[0])
 
 
-def test_velocities_of_an_old_state_are_refused():
-    env = tasks.make("PickCube-v1")
-    state = env.simulation.read()
-    env.step(torch.zeros(1, 8))
-    with pytest.raises(SimulationError, match="no longer the present one"):
-        state.linear_velocity("cube")
-
-
 def test_the_state_is_that_of_now():
     env = tasks.make("PickCube-v1", num_envs=2)
     for _ in range(2):

@@ -8,11 +8,7 @@ from tasks import Area, Cube, register_task
 from tests.tasks import mistakes_declared, mistakes_placed, mistakes_returned
 from tests.tasks.mistakes import Mistake, Tray
 
-MISTAKES = (
-    *mistakes_declared.MISTAKES,
-    *mistakes_returned.MISTAKES,
-    *mistakes_placed.MISTAKES,
-)
+MISTAKES = (*mistakes_declared.MISTAKES, *mistakes_returned.MISTAKES, *mistakes_placed.MISTAKES)
 
 
 FAMILY = (RobotLayoutsError, UserWarning)

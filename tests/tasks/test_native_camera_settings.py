@@ -130,8 +130,7 @@ def test_pictures_of_every_clone_are_native_s(task_id: str):
 
 
 @pytest.mark.parametrize(
-    "what",
-    quick_cases(SETTINGS, ["pose, view and size", "slower shaders for one camera"]),
+    "what", quick_cases(SETTINGS, ["pose, view and size", "slower shaders for one camera"])
 )
 def test_settings_by_name_are_native_s(what: str):
     sensors = unit(SETTINGS[what])
