@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from layouts import Layout, around_table, face_to_face, grid, ring, side_by_side
+from layouts import Layout, around_table, at_task, face_to_face, grid, ring, side_by_side
 from layouts.distances import apart
 from layouts.shared_place import shared_place
 from robots import LayoutError, RobotDescriptor, RobotRegistry
@@ -142,6 +142,18 @@ def test_a_robot_stands_on_its_wheels_beside_one_that_stands_on_its_base(way, tm
     heights = [placement.local_pose.position[2] for placement in layout.values()]
     assert heights == [pytest.approx(0.0205, abs=6e-4), 0.0]
     assert not [f for f in layout.validate(workspaces=False, table=(-2.0, -2.0, 2.0, 2.0)).findings]
+
+
+def test_a_robot_on_high_legs_is_not_raised(tmp_path):
+    robots = {"left": on_a_wheel(tmp_path, -0.3), "right": "panda"}
+    assert side_by_side(robots, spacing="auto")["left"].base_position[2] == 0.0
+
+
+def test_at_a_task_a_robot_stands_on_its_wheels(tmp_path):
+    task = face_to_face({"left": "panda", "right": "panda"}, spacing=1.5)
+    layout = at_task({"left": on_a_wheel(tmp_path, 0.03)}, task)
+    assert layout["left"].base_position[2] == pytest.approx(0.0205, abs=6e-4)
+    assert layout["right"] == task["right"]
 
 
 @pytest.mark.long

@@ -104,6 +104,17 @@ class TestWhereThingsAre:
         corners = {(round(x, 9), round(y, 9)) for x, y, _ in outline}
         assert corners == {(1.0, 1.0), (1.0, 0.0), (-1.0, 0.0), (-1.0, 1.0)}
 
+    def test_the_order_of_declaration_does_not_matter(self):
+        placements = {
+            "last": Placement("panda", (0.0, 0.0, 1.0), on="middle"),
+            "middle": Placement("panda", (0.0, 1.0, 0.0), on="b"),
+        }
+        frames = {"b": Frame((1.0, 0.0, 0.0), on="a"), "a": Frame((1.0, 0.0, 0.0))}
+        layout = Layout(placements, frames)
+        assert layout["last"].base_position == (2.0, 1.0, 1.0)
+        assert layout == Layout(placements, dict(reversed(frames.items())))
+        assert layout.frame_poses["b"] == Pose((2.0, 0.0, 0.0))
+
 
 class TestChangedLayouts:
     LAYOUT = around_table({"a": "panda", "b": "panda_stick"})

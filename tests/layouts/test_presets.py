@@ -304,6 +304,11 @@ class TestGrid:
         with pytest.raises(LayoutError, match="columns is .*; it must be an integer of 1 or more"):
             grid({"a": "panda"}, columns=columns)
 
+    def test_left_out_columns_make_it_square(self):
+        layout = grid({f"arm_{i}": "panda" for i in range(9)}, spacing=1.0)
+        places = {placement.base_position[:2] for placement in layout.values()}
+        assert places == {(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)}
+
 
 DISTANCES = [(side_by_side, "spacing"), (face_to_face, "spacing"), (ring, "radius")]
 DISTANCES += [(grid, "spacing"), (around_table, "inset")]

@@ -133,6 +133,13 @@ class TestDistances:
         (between,) = pair(robot(tmp_path, text, ["turn"]), 0.3).validate().clearances
         assert between.distance == pytest.approx(0.2, abs=5e-4)
 
+    def test_one_above_the_other_is_moved_the_shorter_way(self, tmp_path):
+        """Their boxes are 10 cm wide, and 10 cm and 40 cm high; they overlap by 5 cm in height."""
+        arm = turntable(tmp_path)
+        layout = Layout({"one": Placement(arm), "other": Placement(arm, (0.01, 0.0, 0.35))})
+        (finding,) = layout.validate(samples=0, workspaces=False).findings
+        assert "0.070 m farther apart vertically (0.420 m between" in finding.advice
+
 
 class TestSelfCollisions:
     def fold(self, tmp_path, elbow, noise=0.0, allowed=None, **more):

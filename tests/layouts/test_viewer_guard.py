@@ -4,12 +4,15 @@ import html
 import re
 import socket
 import urllib.request
+from types import SimpleNamespace
 from urllib.parse import urlsplit
 
 import pytest
 
+from layouts.viewer import ViewerError
 from layouts.viewer.guard import REFUSAL, Guard
 from layouts.viewer.page import NO_SLIDERS, save_html
+from layouts.viewer.server import serving
 from layouts.viewer.text import as_html, node, printable
 from tests.layouts.guests import WEBSOCKET, Guest, ask, site, small_cell
 from tests.layouts.hostile_names import HOSTILE_NAMES
@@ -190,6 +193,25 @@ def test_a_token_is_new_each_time_and_not_in_what_is_logged():
     assert one.token != other.token
     assert len(one.token) == 43  # 32 bytes
     assert one.token not in repr(one)
+
+
+def test_a_viser_that_cannot_be_guarded_is_not_served(monkeypatch):
+    import viser.infra._infra as viser_infra
+    from websockets.asyncio.server import ServerConnection, serve
+
+    server = SimpleNamespace(ServerConnection=ServerConnection, serve=serve)
+    real = viser_infra.websockets
+    changed = SimpleNamespace(
+        asyncio=SimpleNamespace(server=server),
+        datastructures=real.datastructures,
+        exceptions=real.exceptions,
+    )
+    monkeypatch.setattr(viser_infra, "websockets", changed)
+    with (
+        pytest.raises(ViewerError, match=r"viser .* would accept any client, so no page is"),
+        serving("127.0.0.1", 0, "cell"),
+    ):
+        pytest.fail("it is served")
 
 
 @pytest.mark.parametrize("name", HOSTILE_NAMES)

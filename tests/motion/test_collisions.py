@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from layouts import Layout, Placement
+from layouts import Layout, Placement, face_to_face
+from layouts.validation.collisions import FAR
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.collision.travel import TravelBounds
 from robot_layouts.motion.model.bodies import WORLD
@@ -95,6 +96,24 @@ def test_an_overlap_has_a_depth():
     assert contact.names[1] == "lid"
     assert contact.distance == pytest.approx(-0.01, abs=1e-6)
     assert str(contact) == f"{contact.names[0]} and lid overlap by 1.0 cm"
+
+
+def test_own_links_keep_their_own_distance(crowd):
+    own = {"own": 0.05, "moving": ["left"]}
+    apart = crowd.checker(clearance=0.2, **own)
+    movers = [[crowd.solids[i].mover for i in pair] for pair in apart.pairs.tolist()]
+    assert {d for (a, b), d in zip(movers, apart.apart.tolist(), strict=True) if a == b} == {0.05}
+    assert {d for (a, b), d in zip(movers, apart.apart.tolist(), strict=True) if a != b} == {0.2}
+    none = crowd.checker(own=None)
+    assert all(crowd.solids[a].mover != crowd.solids[b].mover for a, b in none.pairs.tolist())
+
+
+def test_nothing_within_reach_is_far():
+    cell = Cell(face_to_face({"one": "panda", "other": "panda"}, spacing=30.0))
+    checker = cell.checker(own=None)
+    assert checker.distance(cell.start[None]).tolist() == [FAR]
+    assert checker.nearest(cell.start) is None
+    assert checker.contact(cell.start) is None
 
 
 # -- which pairs count -----------------------------------------------------------------------

@@ -167,6 +167,12 @@ def test_a_start_in_collision_is_named_with_its_depth():
     assert error.value.reason == "start in collision"
 
 
+def test_an_obstacle_at_the_goal_is_named():
+    block = box("block", (0.2, 0.2, 0.2), (0.0, 0.0, 0.3))
+    with pytest.raises(NoPlanError, match="at the goal of left, TCP at .* and block overlap"):
+        plan(cell(), aside(), {"left": in_the_middle()}, obstacles=[block])
+
+
 def test_time_that_is_over_ends_the_search():
     with pytest.raises(NoPlanError, match="in the 0.001 s given") as error:
         plan(cell(), aside(), {"left": turned("left", -1.4)}, patience=0.001)

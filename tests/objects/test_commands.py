@@ -6,9 +6,10 @@ import pytest
 
 from objects import ObjectRegistry
 from objects.inspect import report
-from objects.picture import draw
+from objects.picture import draw, save_sheet
 from objects.registry import CATALOGUE
 from robot_layouts.__main__ import main
+from robots import DescriptorError
 
 
 def test_the_list_has_a_line_for_each(capsys):
@@ -61,3 +62,8 @@ def test_a_mistake_is_named_and_leaves_nothing(words, code, message, capsys, tmp
     assert main(["objects", *words]) == code
     assert capsys.readouterr().err.startswith(message)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_no_picture(tmp_path):
+    with pytest.raises(DescriptorError, match="there is nothing to draw; name one object or more"):
+        save_sheet([], tmp_path / "a.png")

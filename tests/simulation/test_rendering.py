@@ -61,6 +61,14 @@ def test_worlds_may_go_while_they_are_drawn(renderer, mode):
         del begun
 
 
+@pytest.mark.long
+def test_another_camera_adds_no_light(drawn):
+    drawn.reset(seed=3)
+    first = drawn.render()
+    Cameras(drawn.simulation, (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)).take()
+    np.testing.assert_array_equal(drawn.render(), first)
+
+
 def test_a_rebuilt_world_is_drawn_alike(drawn):
     drawn.reset(seed=3)
     first = drawn.render()

@@ -187,6 +187,21 @@ def test_gymnasium_takes_images():
 
 
 @drawing
+def test_interfaces_show_what_cameras_see():
+    fields = {"cameras": SMALL}
+    env = gymnasium.make(f"RobotLayouts/{TASK}", render_mode="sensors", **fields)
+    env.reset(seed=3)
+    assert env.render().shape == (32, 2 * 48, 3)  # colours and depth
+    env.close()
+    vec = gymnasium.make_vec(
+        f"RobotLayouts/{TASK}", num_envs=2, num_workers=0, render_mode="all", **fields
+    )
+    vec.reset(seed=3)
+    assert [picture.shape for picture in vec.render()] == [(512, 512 + 48, 3)] * 2
+    vec.close()
+
+
+@drawing
 def test_interfaces_give_points_and_flags():
     fields = {"obs_mode": "pointcloud", "cameras": SMALL}
     env = gymnasium.make(f"RobotLayouts/{TASK}", **fields)

@@ -145,6 +145,22 @@ def test_targets_are_part_of_the_state(mode, kind, size):
         assert not torch.equal(obs[1, entry], target[0])
 
 
+def test_worlds_do_not_disturb_each_other():
+    mode = "pd_ee_target_delta_pose"
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1, 1, (8, 2, 7)).astype(np.float32)
+    with (
+        closing(tasks.make("PickCube-v1", num_envs=2, control_mode=mode)) as both,
+        closing(tasks.make("PickCube-v1", control_mode=mode)) as one,
+    ):
+        both.reset(seed=[5, 6])
+        one.reset(seed=6)
+        for action in actions:
+            found = both.step(action)[0]
+            expected = one.step(action[1:])[0]
+            np.testing.assert_array_equal(found[1], expected[0])
+
+
 # -- arms by name --------------------------------------------------------------------------------
 
 

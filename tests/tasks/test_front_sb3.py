@@ -169,3 +169,11 @@ def test_images_are_learned_from(drawn):
     model = PPO("MultiInputPolicy", env, n_steps=2, batch_size=4, n_epochs=1, device="cpu")
     extractors = model.learn(4).policy.features_extractor.extractors
     assert isinstance(extractors["sensor_data/base_camera/rgb"], NatureCNN)
+
+
+@pytest.mark.long
+def test_pictures(drawn):
+    env = make(num_envs=2, render_mode="rgb_array", timeout=None)
+    env.reset()
+    assert env.render("rgb_array").shape == (1024, 512, 3)
+    env.close()

@@ -191,3 +191,12 @@ def test_what_cannot_be_made(fields, message):
 def test_wrong_reset_options(options, message):
     with pytest.raises(TaskError, match=message):
         make().reset(options=options)
+
+
+@pytest.mark.long
+def test_pictures(drawn):
+    with closing(make(num_envs=2, num_workers=1, render_mode="rgb_array", timeout=None)) as env:
+        env.reset(seed=0)
+        pictures = env.render()
+    assert [p.shape for p in pictures] == [(512, 512, 3)] * 2
+    assert (pictures[0] != pictures[1]).any()

@@ -57,6 +57,16 @@ def test_a_heavier_body_accelerates_less_under_the_same_force(factor: float) -> 
     )
 
 
+def test_heavier_links_lag_behind_their_drives() -> None:
+    ways: list[float] = []
+    for factor in (0.2, 1.0, 5.0):
+        env = made(Randomization(mass={"arm": Fixed(factor)}))
+        start = env.simulation.read().qpos("arm")[0, 0]
+        env.step(ARM_MOVES)
+        ways.append(float(env.simulation.read().qpos("arm")[0, 0] - start))
+    assert ways[0] > ways[1] > ways[2] > 0
+
+
 @pytest.mark.parametrize("coefficient", [0.1, 0.3, 0.8])
 def test_a_body_slides_as_far_as_friction_lets_it(coefficient: float) -> None:
     both = {"cube": Fixed(coefficient), "table-workspace": Fixed(coefficient)}
@@ -205,6 +215,18 @@ def test_actions_take_effect_after_their_delay(delay: int, mode: str) -> None:
         env.step(action)
         ways.append(float(np.abs(env.simulation.read().qpos("arm")[0] - start)[:7].max()))
     assert [way > 5e-3 for way in ways] == [step >= delay for step in range(6)]
+
+
+def test_delayed_actions_go_on_where_others_began() -> None:
+    late, plain = made(Randomization(action_delay=Whole(2, 2)), num_envs=2), made()
+    for _ in range(5):  # of which two pass before the first action arrives
+        late.step(ARM_MOVES.tile(2, 1))
+    late.step(STILL.tile(2, 1), env_ids=[1])
+    state = late.simulation.read().qpos("arm")
+    for _ in range(3):
+        plain.step(ARM_MOVES)
+    assert state[0, 0] == pytest.approx(plain.simulation.read().qpos("arm")[0, 0], abs=1e-3)
+    assert state[1, 0] > state[0, 0]  # which moved one step more
 
 
 @pytest.mark.parametrize("delay", [0, 2])
