@@ -13,6 +13,7 @@ pytest.importorskip("matplotlib")
 import tasks
 from robot_layouts.data import evaluate
 from robot_layouts.data.playing.policies import find_policy
+from robots import TaskError
 from tests.examples.learning import assert_same, examples, finish, kill_while_it_learns, start
 
 __all__ = ["examples"]
@@ -95,3 +96,9 @@ def test_what_was_learned_is_a_policy_by_name(ppo, tmp_path, monkeypatch):
         obs, reward, _, _, _ = env.step(policy(obs)[None])
         total += reward.item()
     assert scores[5].total == pytest.approx(total)
+
+
+def test_a_folder_without_checkpoints_is_named(ppo, tmp_path):
+    with pytest.raises(TaskError) as raised:
+        ppo.LearnedPolicy(tmp_path, ppo.FILES, ppo._loaded)(np.zeros((1, 66), np.float32))
+    assert str(raised.value) == f"{tmp_path} holds no checkpoint; a run leaves some there"

@@ -1,4 +1,4 @@
-"""The tutorial's notebook does what it says, in a plain process and in a notebook."""
+"""The tutorial's notebook does what it says, cell by cell in a plain process."""
 
 import json
 import sys
