@@ -155,3 +155,17 @@ def test_anchored_bodies_return_and_velocities_vanish():
     assert state.position("table-workspace")[0] == pytest.approx([-0.12, 0, -0.9196429])
     assert not state.linear_velocity("cube").any()
     assert not state.qvel("arm").any()
+
+
+def test_a_held_group_stays_where_the_layout_starts_it_whatever_the_action():
+    panda = RobotRegistry.load("panda")
+    gripper = dataclasses.replace(panda.action_split.groups["gripper"], held=True)
+    split = panda.action_split.replace(gripper=gripper)
+    layout = single({"arm": dataclasses.replace(panda, action_split=split)})
+    simulation = Simulation(layout, with_cube, 1)
+    stand(simulation)
+    assert layout.action_dim == 7
+    for number in (-1.0, 1.0):
+        action = np.full((1, 7), number, np.float32)
+        simulation.step(action, simulation.read().joint_positions)
+        assert simulation.drive_targets[0, 7:] == pytest.approx([0.04, 0.04])
