@@ -243,3 +243,11 @@ class TestCommand:
         assert (status, out) == (2 if "unknown" in err else 1, "")
         assert message in err
         assert "Traceback" not in err
+
+    @pytest.mark.long
+    def test_what_is_left_out_is_told_by_the_exit_status(self, capsys):
+        words = "arm=so100 --target cube=0,0,0.1 --target moon=0,0,3 --partial"
+        status, out, _ = self.run(words, capsys)
+        assert status == 1
+        assert "no robot reaches moon" in out
+        assert "cube (0, 0, 0.1): arm reaches it" in out

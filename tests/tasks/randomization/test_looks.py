@@ -78,6 +78,22 @@ def test_a_camera_is_moved_turned_and_widened(plain: TaskEnv) -> None:
 
 
 @drawing
+def test_a_robots_camera_goes_by_the_robots_place() -> None:
+    def shifted(randomization: Randomization | None) -> dict[str, torch.Tensor]:
+        making = {"obs_mode": "rgb", "camera_size": (16, 16)}
+        env = tasks.make("StackCube-v1", randomization=randomization, **making)
+        params = env.reset(seed=0)[0]["sensor_param"]
+        return {name: camera["cam2world_gl"][0] for name, camera in params.items()}
+
+    own = shifted(None)
+    moved = shifted(Randomization(cameras={"arm.hand_camera": CameraShift(x=0.02)}))
+    assert torch.equal(own["base_camera"], moved["base_camera"])
+    way = moved["hand_camera"] - own["hand_camera"]
+    torch.testing.assert_close(way[:3, 3], -0.02 * own["hand_camera"][:3, 2])
+    assert not way[:3, :3].any()
+
+
+@drawing
 @pytest.mark.parametrize("light", ["side", "top", "ambient"])
 def test_a_light_grows_weaker(plain: TaskEnv, light: str) -> None:
     env = made(Randomization(lights={light: Light(strength=0.3, red=0.0)}))
@@ -105,6 +121,15 @@ def test_paint_is_seen_on_what_is_painted_alone(plain: TaskEnv) -> None:
     assert np.array_equal(own[:, [2, 1, 0]], painted)
     elsewhere = (seen(plain) != seen(env)).any(-1).sum()
     assert elsewhere == len(own)
+
+
+@drawing
+def test_some_paint_leaves_some_of_the_own_colour() -> None:
+    def red(share: float) -> float:
+        env = made(Randomization(colors={"cube": Surface(red=0.0, share=share)}))
+        return float(of_body(env, 0, "cube")[:, 0].mean())
+
+    assert red(0) > red(0.5) > red(1)
 
 
 @drawing
