@@ -166,6 +166,22 @@ def test_the_commands_of_the_gallery_are_understood():
     assert problems(*GALLERY) == []
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("robot-layouts evaluate expert --task X-v1", "unrecognized arguments: expert"),
+        ("A=1 robot-layouts record --task X-v1", "required: --episodes, --out"),
+        ("python -m layouts shwo", "Did you mean 'show'"),
+        ('make bench ARGS="--recrod"', "unrecognized arguments: --recrod"),
+        ("pip install 'robot-layouts[veiw]'", "no extra veiw"),
+    ],
+)
+def test_a_wrong_command_is_found_and_told(tmp_path, line, words):
+    (tmp_path / "page.md").write_text(f"```console\n$ robot-layouts tasks list\n$ {line}\n```\n")
+    (found,) = problems(tmp_path / "page.md")
+    assert words in found
+
+
 EXAMPLES = [line for line in lines_of(*PAGES) if re.match(r"python examples/", line)]
 
 

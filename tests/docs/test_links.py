@@ -64,6 +64,13 @@ def test_links_and_paths_lead_somewhere(path):
     assert broken_in_text(path.read_text(encoding="utf-8"), path, ROOT) == []
 
 
+def test_what_leads_nowhere_is_named():
+    wrong = ["othr.md", "index.md#a-titel", "#there", "../pictures/b.png"]
+    text = "".join(f"[a]({link}) " for link in (*wrong, "index.md")) + "`docs/othr.md`"
+    found = broken_in_text(f"# Here\n[a](#here) {text}", ROOT / "docs/page.md", ROOT)
+    assert sorted(found) == sorted([*wrong, "docs/othr.md"])
+
+
 @pytest.mark.parametrize("page", sorted((ROOT / "docs/project").glob("*.md")), ids=lambda p: p.stem)
 def test_what_the_site_includes_has_links_that_lead_somewhere(page):
     name = page.relative_to(ROOT / "docs").as_posix()

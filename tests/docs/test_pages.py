@@ -19,6 +19,19 @@ def test_it_runs(page, tmp_path):
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
 
 
+@pytest.mark.parametrize(
+    ("block", "words"),
+    [("```python\nassert 1 == 2\n```", '", line 6'), ("```console\n$ false\n```", "false")],
+)
+def test_what_fails_is_told_with_its_line_or_command(block, words, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"```python\nx = 1\n```\n\n{block}\n")
+    (tmp_path / "run").mkdir()
+    done = play_apart(page, tmp_path / "run")
+    assert done.returncode != 0
+    assert words in done.stderr
+
+
 def test_every_tutorial_is_played():
     tutorials = {page for page in PAGES if page.startswith("tutorials/")}
     assert tutorials - {*PLAYED} == {"tutorials/index.md"}
