@@ -74,6 +74,16 @@ def same(a: Any, b: Any) -> bool:
     return (a.dtype, a.shape) == (b.dtype, b.shape) and torch.equal(a, b)
 
 
+def test_a_difference_is_noticed():
+    flag, turned = torch.zeros(2), torch.tensor([0.0, 1e-7])
+    one = {"extra": {"flag": flag, "pose": flag}}
+    assert differences(one, {"extra": {"flag": flag.clone(), "pose": flag}}) == []
+    assert differences(one, {"extra": {"flag": flag, "pose": turned}}) == ["/extra/pose"]
+    assert differences(one, {"extra": {"flag": flag.bool(), "pose": flag}}) == ["/extra/flag"]
+    for other in ({"pose": flag, "flag": flag}, {"flag": flag}):
+        assert differences(one, {"extra": other})[0].startswith("keys: ")
+
+
 @contextmanager
 def native_in(task_id: str, mode: str, **making: Any) -> Iterator[Any]:
     with closing(make_native(task_id, obs_mode=mode, **making)) as env, quiet():

@@ -107,6 +107,13 @@ def test_workers_change_nothing(mode):
         assert env.metadata["autoreset_mode"] is mode
 
 
+def test_a_difference_is_noticed():
+    mode = AutoresetMode.NEXT_STEP
+    first, second = play(make(), mode, 3), play(make(), mode, 3, seed=8)
+    assert differences(first, play(make(), mode, 3)) == []
+    assert "/0/0" in differences(first, second)
+
+
 @pytest.mark.parametrize("ignored", [False, True])
 def test_terminations_may_be_ignored(ignored):
     env = make(ignore_terminations=ignored, autoreset_mode="SAME_STEP")
