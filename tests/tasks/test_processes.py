@@ -15,12 +15,14 @@ import numpy as np
 import pytest
 
 import tasks
+from benchmarks.soak import read_level
 from robot_layouts.core.processes.transport import packed
 from robot_layouts.core.processes.worker import Status, Worker
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import SimulationError, TaskError
 from tasks.interfaces.vector import VectorTask
 from tasks.interfaces.workers import VectorWorkerError
+from tests.fresh_process import in_fresh_process
 from tests.tasks import breaking
 
 TASK = "PushCube-v1"
@@ -78,6 +80,26 @@ def test_worlds_are_freed_at_once_when_they_are_closed_or_nobody_holds_them(fron
         else:
             del env
         assert world() is None
+
+
+def levels(workers, first, last):
+    """Return what this process holds after some cycles of make, step and close, and after more."""
+    found = []
+    for cycle in range(1, last + 1):
+        with vector(workers) as env:
+            env.step(ACTION)
+        if cycle in (first, last):
+            found.append(read_level())
+    return found
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("cycles", [(0, 100, 600), (2, 10, 40)], ids=["here", "with workers"])
+def test_nothing_grows_over_hundreds_of_vectors(cycles):
+    first, last = in_fresh_process(levels, *cycles)
+    assert last.memory - first.memory < 2.0  # MB
+    for quantity in ("descriptors", "threads", "processes", "shared"):
+        assert getattr(last, quantity) == getattr(first, quantity)
 
 
 # -- how they start -------------------------------------------------------------------------------
