@@ -119,6 +119,15 @@ def renderer() -> object:
     return system
 
 
+@pytest.fixture
+def drawn(renderer: object) -> None:
+    """Skip where nothing can be drawn."""
+    from robot_layouts.simulation.rendering import vulkan_problem
+
+    if problem := vulkan_problem():
+        pytest.skip(problem)
+
+
 @pytest.hookimpl(tryfirst=True)  # before xdist looks at the groups
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Give what shares something costly to one process, which makes it once.

@@ -56,25 +56,6 @@ def test_a_skip_inside_the_test_fails_if_required(run, how):
     assert result.ret == pytest.ExitCode.TESTS_FAILED
 
 
-@pytest.mark.long
-def test_a_module_skipped_for_want_of_mani_skill_fails_if_required(run):
-    source = "import pytest\npytest.skip('could not import mani_skill', allow_module_level=True)"
-    assert run(source, required=False).ret == pytest.ExitCode.NO_TESTS_COLLECTED
-    assert run(source, required=True).ret not in (
-        pytest.ExitCode.OK,
-        pytest.ExitCode.NO_TESTS_COLLECTED,
-    )
-
-
-@pytest.mark.long
-def test_no_native_test_at_all_fails_if_required(run):
-    source = "def test_something_else(): pass"
-    assert run(source, required=False).ret == pytest.ExitCode.OK
-    result = run(source, required=True)
-    assert result.ret == pytest.ExitCode.TESTS_FAILED
-    result.stdout.fnmatch_lines(["native comparison: required, but no test of it passed"])
-
-
 @pytest.mark.xdist_group("together")
 def test_xdist_learns_of_groups(request):
     """Else each of their tests goes to any process, and each process makes what they share."""

@@ -106,23 +106,8 @@ class TestDependencies:
     def test_the_rooms_import_what_is_declared(self):
         declared = names_of(PROJECT["dependencies"])
         for extra in (
-            "checks",
-            "preview",
-            "view",
-            "browser",
-            "light",
-            "video",
-            "export",
-            "log",
-            "mjcf",
-            "motion",
-            "pettingzoo",
-            "ray",
-            "sb3",
-            "served",
-            "usd",
-            "wandb",
-            "xacro",
+            *("checks", "preview", "view", "browser", "light", "video", "export", "log", "mjcf"),
+            *("motion", "pettingzoo", "ray", "sb3", "served", "usd", "wandb", "xacro"),
         ):
             declared |= names_of(PROJECT["optional-dependencies"][extra])
         used = {module for room in PACKAGES for module in imports_of(room, everywhere=True)}

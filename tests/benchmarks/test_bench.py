@@ -7,20 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import tasks
 from benchmarks.__main__ import main
-from benchmarks.bench.environments import Played, Worked
+from benchmarks.bench.environments import Played
 from benchmarks.bench.measurement import BenchmarkError, Clock, Measurement, Settings
-from benchmarks.bench.plot import draw
 from benchmarks.bench.report import RECORD, Report, machine, read_report, summary
-from benchmarks.bench.run import BENCHMARKS, BESIDE_NATIVE
-from benchmarks.bench.worlds import make_pile
-from parity.native import make_native, native_action
-from robot_layouts.experts import find_expert, register_expert
-from robot_layouts.simulation.sapien3.backend import worlds_below
-from tests.native import NATIVE
+from benchmarks.bench.run import BENCHMARKS
 from tests.quick import quick_cases
 
 TINY = Settings(
@@ -63,29 +56,6 @@ def report_of(*measurements):
     return Report(measurements, machine(), str(Clock()), (0.5, 1.25))
 
 
-class TestFigures:
-    def test_medians_and_medians_of_ratios(self):
-        assert NUMBERS.median("step", 1) == 3.0
-        assert NUMBERS.ratio("step", "physics", 1) == 2.5  # of 3, 1, 2.5; not 3 / 2
-        assert NUMBERS.quartiles("step", 1) == (2.5, 6.5)
-        assert NUMBERS.quartiles("step", 2) is None
-
-    def test_what_was_not_measured_is_a_dash(self):
-        assert NAMES.headings() == ["task", "here", "native", "native / here"]
-        assert list(NAMES.rows()) == [["A-v1", "1.50", "4.00", "2.67"], ["B-v1", "2.00", "–", "–"]]
-
-    def test_samples_are_taken_in_turns_after_a_warm_up(self):
-        taken, ticks = [], []
-        settings = replace(TINY, tick=ticks.append)
-        variants = {name: lambda n, name=name: taken.append((name, n)) or 10.0 * n for name in "ab"}
-        assert settings.interleave(variants) == {"a": [10.0, 20.0], "b": [10.0, 20.0]}
-        assert taken == [(name, number) for number in (0, 1, 2) for name in ("a", "b")]
-        assert sum(ticks) == pytest.approx(1)
-        taken.clear()
-        settings.interleave(variants, rounds=1, warm_up=False)
-        assert taken == [("a", 1), ("b", 1)]
-
-
 class TestWhatIsTimed:
     def test_a_step_and_the_physics_alone_are_the_same_motion(self):
         played = Played(tasks.make("PickCube-v1", num_envs=2), replace(TINY, steps=10))
@@ -96,38 +66,6 @@ class TestWhatIsTimed:
         assert np.array_equal(*ends)
         played.step(4)
         assert not np.array_equal(played.env.simulation.read().joint_positions, ends[0])
-
-    def test_an_experts_episode_succeeds_in_every_round_and_its_physics_is_the_same(self):
-        worked = Worked(tasks.make("PickCube-v1"), TINY)
-        simulation = worked.env.simulation
-        ends: list[NDArray[np.float32]] = []
-        for play in (worked.step, worked.physics, worked.step):
-            assert play(len(ends)) > 0
-            state = simulation.read()
-            assert worked.env.task.evaluate(state)["success"].all()
-            ends.append(state.joint_positions.copy())
-        assert np.array_equal(ends[0], ends[1])
-        assert np.array_equal(ends[0], ends[2])
-
-    def test_a_task_that_its_expert_never_solves_is_not_measured(self):
-        task_id = "TwoRobotPickCube-v1"
-        expert = find_expert(task_id)
-        register_expert(task_id, lambda task, seed: np.zeros((1, 16), np.float32))
-        try:
-            with pytest.raises(BenchmarkError, match="solves none of the seeds"):
-                Worked(tasks.make(task_id), TINY)
-        finally:
-            register_expert(task_id, expert)
-
-    @pytest.mark.parametrize(("cubes", "pairs"), [(0, 1), (8, 25), (64, 400)])
-    def test_cubes_of_a_pile_touch_and_stay_awake(self, cubes, pairs):
-        env = make_pile(cubes)
-        for _ in range(40):
-            env.step(np.zeros((1, 8), np.float32))
-        world = worlds_below(env.simulation)[0]
-        bodies = [world.bodies[name] for name in ("cube", *(f"pile{i}" for i in range(cubes)))]
-        assert not any(body.component.is_sleeping for body in bodies)
-        assert env.touching() >= pairs
 
 
 QUICK = ("reset", "step", "validation")  # the others start processes, draw, or take longer
@@ -148,36 +86,6 @@ def test_every_benchmark_measures(name, request):
     assert all({*pair} <= {*found.samples} for pair in found.ratios)
     assert {*found.floors} <= {*found.samples}
     assert not multiprocessing.active_children()
-
-
-class TestBesideNative:
-    pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
-
-    def test_both_play_the_same_motion(self):
-        native, ours = make_native("PickCube-v1"), tasks.make("PickCube-v1")
-        played = Played(ours, TINY)
-        for number in (0, 5, 6):
-            native.reset(seed=number)
-            for action in played.actions(number):
-                native.step(native_action(native, action[0]))
-            played.step(number)
-        here = ours.simulation.read().qpos("arm")
-        assert np.array_equal(native.agent.robot.get_qpos().numpy(), here)
-
-    @pytest.mark.long
-    @pytest.mark.parametrize("name", BESIDE_NATIVE)
-    def test_native_is_measured(self, name):
-        both = ("PickCube-v1", "FourRobotStack-v1")
-        found = BESIDE_NATIVE[name](replace(TINY, rounds=1, vector_task=both))
-        assert all(
-            found.median(series, "PickCube-v1") > 0
-            for series in found.samples
-            if series.startswith("native")
-        )
-        if name == "step":
-            assert [*found.samples][:2] == ["here, expert's actions", "native, expert's actions"]
-        if name == "vector":
-            assert found.median("native", "FourRobotStack-v1") is None
 
 
 class TestCommand:
@@ -232,35 +140,9 @@ def test_a_report_is_read_as_it_was_written(tmp_path):
         summary(report)
 
 
-def test_what_is_measured_later_says_on_what_it_was(tmp_path):
-    later = replace(report_of(replace(NAMES, unit="s")), load=(3.0, 9.0))
-    both = report_of(NUMBERS, NAMES).with_those_of(later, ("names", "more", "numbers"))
-    assert both.measurements == (replace(NAMES, unit="s", conditions=later.conditions()), NUMBERS)
-    assert "load average 3.0 to 9.0" in both.page()
-    both.write(tmp_path)
-    assert read_report(tmp_path / "bench.json") == both
-
-
-@pytest.mark.parametrize("text", ["", "{}", "[]", '{"measurements": [3]}'])
-def test_something_else_is_refused(tmp_path, text):
-    (tmp_path / "bench.json").write_text(text)
-    with pytest.raises(BenchmarkError, match=r"cannot read .*bench\.json"):
-        read_report(tmp_path / "bench.json")
-
-
 def test_the_record_is_whole():
     record = read_report()
     assert not record.left_out
     assert {one.name for one in record.measurements} == {*BENCHMARKS}
     assert {*record.find("step").values} <= {*tasks.list_clones()}
     assert {*json.loads(RECORD.read_text())["machine"]} == {"cpu", "cores", "system", "versions"}
-
-
-class TestPlot:
-    def test_lines_over_numbers(self):
-        (axes,) = draw([NUMBERS], "told").axes
-        assert (axes.get_xlabel(), axes.get_ylabel()) == ("robots", "µs per step")
-        step, physics = axes.lines
-        assert list(step.get_ydata()) == [3.0, 4.0]
-        assert physics.get_linestyle() == "--"
-        assert [text.get_text() for text in axes.get_legend().get_texts()] == ["step", "physics"]

@@ -3,29 +3,13 @@
 from __future__ import annotations
 
 import re
-import shutil
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.bench.measurement import number_text
-from benchmarks.bench.report import read_report
-from benchmarks.gallery import pages as gallery
-from benchmarks.gallery.pages import FOLDER, _read, all_pages, complaints, solved
-from benchmarks.gallery.pictures import (
-    BACKGROUND,
-    LARGEST_CLIP,
-    LARGEST_PORTRAIT,
-    PORTRAIT_SIZE,
-    portrait,
-)
+from benchmarks.gallery.pages import FOLDER, _read, all_pages, solved
+from benchmarks.gallery.pictures import LARGEST_CLIP, LARGEST_PORTRAIT
 from benchmarks.records import RecordError
-from parity.results import read_results
-from robots import RobotRegistry
-from robots.registry import CATALOGUE as ROBOTS
-from tasks.registry import CATALOGUE as TASKS
 
 LARGEST_GALLERY = 12_000_000  # bytes
 LINK = re.compile(r"\]\(([^)#]+)\)")
@@ -35,14 +19,6 @@ PICTURE = re.compile(r"!\[([^]]*)\]")
 @pytest.fixture(scope="module")
 def pages() -> dict[str, str]:
     return all_pages(_read(), FOLDER)
-
-
-@pytest.fixture
-def copy(tmp_path, monkeypatch) -> Path:
-    """Return a copy of the gallery, which the command takes for the gallery."""
-    folder = Path(shutil.copytree(FOLDER, tmp_path / "gallery"))
-    monkeypatch.setattr(gallery, "FOLDER", folder)
-    return folder
 
 
 class TestCommitted:
@@ -64,71 +40,9 @@ class TestCommitted:
         assert sum(path.stat().st_size for path in files) <= LARGEST_GALLERY
 
 
-@pytest.mark.long
-def test_what_was_altered_is_named_and_written_again(copy, capsys):
-    (copy / "tasks" / "PickCube-v1.md").write_text("changed")
-    (copy / "robots" / "panda.md").unlink()
-    (copy / "robots" / "nobody.md").touch()
-    (copy / "media" / "robots" / "so100.webp").unlink()
-    (copy / "media" / "tasks" / "Nothing-v1.webp").touch()
-    record = _read()
-    record["robots"]["koch"]["urdf_sha256"] = "0" * 64
-    found = list(complaints(record, copy))
-    for expected in (
-        "tasks/PickCube-v1.md is stale; run `python -m benchmarks gallery`",
-        "robots/panda.md is missing; run `python -m benchmarks gallery`",
-        "robots/nobody.md is of no task or robot",
-        "media/robots/so100.webp is missing; run `.* --pictures so100`",
-        "media/tasks/Nothing-v1.webp is of no task or robot; remove it",
-        "the URDF of koch has changed; run `.* --measure koch`",
-    ):
-        assert any(re.match(expected, line) for line in found), expected
-    # The page of a robot, and the cards, show no picture that there is not.
-    stale = {line.split()[0] for line in found if " is stale" in line}
-    assert stale == {"tasks/PickCube-v1.md", "robots/so100.md", "index.md"}
-    assert main(["gallery", "--check"]) == 1
-    assert main(["gallery"]) == 0
-    assert len(list(copy.rglob("*.md"))) == 1 + len(TASKS) + len(ROBOTS)
-
-
-class TestFigures:
-    def test_of_experts_and_comparisons(self, pages):
-        for task_id, found in _read()["tasks"].items():
-            count = len(solved(found["expert"]))
-            assert (
-                f"{count} of {found['expert']['episodes']} episodes" in pages[f"tasks/{task_id}.md"]
-            )
-        for task_id, found in read_results()["tasks"].items():
-            page = pages[f"tasks/{task_id}.md"]
-            assert f"{found['episodes']} episodes, {found['steps']:,} steps" in page
-            assert f"**Observation:** {found['observation_size']} numbers" in page
-
-    def test_of_the_benchmarks(self, pages):
-        step = read_report().find("step")
-        for task_id in step.values:
-            cells = [number_text(step.median(name, task_id)) for name in step.samples]
-            assert f"| {' | '.join(cells)} |" in pages[f"tasks/{task_id}.md"]
-
-    def test_every_joint_of_a_robot_is_on_its_page(self, pages):
-        for name in ROBOTS:
-            joints = RobotRegistry.load(name).joints
-            assert all(f"| `{joint}` |" in pages[f"robots/{name}.md"] for joint in joints)
-
-
 def test_what_the_record_lacks_is_named_with_the_command():
     record = _read()
     del record["tasks"]["PushT-v1"]
     with pytest.raises(RecordError, match="no tasks PushT-v1; run `.* --measure PushT-v1`"):
         all_pages(record, FOLDER)
     assert solved({"episodes": 3, "failed": {"0": "dropped", "2": "late"}}) == [1]
-
-
-@pytest.mark.long
-@pytest.mark.native  # because of the pictures
-def test_a_portrait_fills_its_picture(renderer):
-    _, picture = portrait(RobotRegistry.load("panda"))
-    rows, columns = np.nonzero((picture != BACKGROUND).any(-1))
-    last = PORTRAIT_SIZE - 1
-    edges = [rows.min(), columns.min(), last - rows.max(), last - columns.max()]
-    assert min(edges) > 0.03 * PORTRAIT_SIZE
-    assert min(rows.min(), columns.min()) < 0.08 * PORTRAIT_SIZE

@@ -15,6 +15,7 @@ from benchmarks.objects import NAMES, digest_of, kind_of
 from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
 from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
+from benchmarks.robots.judge import EXPECTED, expected_of, read_expectations
 from objects import ObjectRegistry
 from objects.registry import CATALOGUE
 from robot_layouts.data.receipts import Receipt
@@ -79,6 +80,18 @@ def test_a_record_is_read_as_it_was_written(tmp_path):
     assert read_record(tmp_path / "none.json", tasks={}) == {"tasks": {}}
     with pytest.raises(RecordError, match=r"cannot read .*a\.json: KeyError\('runs'\)"):
         read_record(tmp_path / "a.json", runs={})
+
+
+def test_every_robot_of_the_survey_is_known_with_its_joints():
+    expectations = read_expectations(EXPECTED)
+    for key, seen in record("robots")["robots"].items():
+        expected = expected_of(key, expectations)
+        assert expected.kind != "unknown", key
+        groups = seen.get("loads", {}).get("groups", {})
+        joints = [joint for group in groups.values() for joint in group["joints"]]
+        for limb in expected.arms.values() if joints else ():
+            for pattern in (*limb.joints, *limb.gripper):
+                assert any(Path(joint).match(pattern) for joint in joints), (key, pattern)
 
 
 def test_what_the_page_of_objects_promises():
@@ -185,33 +198,3 @@ def test_a_receipt_is_of_the_run(path):
     assert (ROOT / "examples" / f"{example}.py").exists()
     assert receipt.policy["files"]
     assert receipt.task == describe_task(get_task_class(receipt.task["id"]))
-
-
-def test_a_run_of_imitation_is_added_and_takes_the_place_of_an_older_one(tmp_path, capsys):
-    run = {
-        "recipe": {"task": "PushCube-v1", "episodes": 3, "steps": 20, "batch": 4, "size": 96},
-        "test_seeds": [1_000_000, 1_000_003],
-        "success": 0.75,
-        "failed": [1_000_002],
-        "curve": [{"steps": 10, "success": 0.5}, {"steps": 20, "success": 1}],
-    }
-    out = tmp_path / "record.json"
-    for found in (run, {**run, "success": 1.0, "failed": []}):
-        (tmp_path / "learning_curve.json").write_text(json.dumps(found))
-        assert main(["imitation", str(tmp_path), "--out", str(out)]) == 0
-    rows = (tmp_path / "record.md").read_text().splitlines()
-    assert "| PushCube-v1, from pictures | 3 | 20 of 4 | 4 | 100 (51.0 to 100.0) | none |" in rows
-    assert (tmp_path / "record.png").read_bytes().startswith(b"\x89PNG")
-    assert main(["reinforcement", str(tmp_path), "--out", str(tmp_path / "other.json")]) == 2
-    assert "holds no run of PPO or MAPPO" in capsys.readouterr().err
-
-
-@pytest.mark.long
-def test_a_cell_is_searched_once(tmp_path):
-    out, words = tmp_path / "seen.json", ["placing", "--cells", "three small arms"]
-    assert main([*words, "--out", str(out)]) == 0
-    before, cell = out.read_text(), json.loads(out.read_text())["cells"]["three small arms"]
-    assert cell["search"]["clear"]
-    assert cell["search"]["shared"] > cell["ring"]["shared"]
-    assert main([*words, "--out", str(out)]) == 0
-    assert out.read_text() == before

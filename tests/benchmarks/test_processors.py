@@ -10,11 +10,10 @@ from platform import libc_ver
 
 import pytest
 
-from benchmarks.asking import EMULATOR, PLAIN, Setting, answers_under
+from benchmarks.asking import EMULATOR, PLAIN, answers_under
 from benchmarks.processors import (
     EXPERT,
     PACKAGES,
-    PICTURES,
     PORTABLE,
     Played,
     _driver,
@@ -25,7 +24,6 @@ from benchmarks.processors import (
     settings,
 )
 from benchmarks.receipts import CELLS, STEPS, ways
-from robots import SimulationError
 
 RECORD = Path(__file__).parents[2] / "docs/processors.json"
 FEW = [
@@ -33,16 +31,6 @@ FEW = [
     Played("StackCube-v1", 0, EXPERT, 0),
     Played("PokeCube-v1", 4, "pd_ee_delta_pose", 4),
 ]
-
-
-@pytest.mark.long
-def test_what_depends_on_the_processor_is_seen():
-    if "GenuineIntel" not in Path("/proc/cpuinfo").read_text():
-        pytest.skip("MKL computes differently by choice on Intel's processors alone")
-    one = play_under(settings()[PLAIN], FEW)
-    other = play_under(settings()["MKL, any"], FEW)
-    found = differences(FEW, one, other)
-    assert "states" in found[str(FEW[2])]  # by torch's square roots
 
 
 @pytest.mark.long
@@ -63,22 +51,6 @@ def test_an_emulated_processor_computes_the_same():
     native = play_under(settings()[PORTABLE], FEW)
     assert not differences(FEW, native, play_under(settings()["Nehalem, portable"], FEW))
     assert differences(FEW, native, play_under(settings()["Nehalem, as it is"], FEW))
-
-
-@pytest.mark.long
-def test_a_process_that_ends_too_early_is_reported():
-    with pytest.raises(SimulationError, match="after 0 of 1 answers"):
-        play_under(Setting("", {}), [Played("PickCubr-v1", 0, EXPERT, 0)])
-
-
-@pytest.mark.long
-def test_pictures_are_the_same_with_vectors_of_512_bits(renderer):
-    if "llvmpipe" not in _driver():
-        pytest.skip("these variables are of Mesa's software driver alone")
-    few = [Played("PickCube-v1", 1, PICTURES, 1)]
-    plain, wide = (play_under(drawings()[name], few) for name in (PLAIN, "512 bits"))
-    assert len(plain[0]) == 12  # four cameras, three textures
-    assert wide == plain
 
 
 @pytest.mark.long

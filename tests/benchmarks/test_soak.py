@@ -1,33 +1,17 @@
 """``python -m benchmarks soak``: what is healthy passes, and what leaks is reported."""
 
-import os
-import subprocess
-import sys
-import threading
-import time
-from contextlib import contextmanager, redirect_stdout
+from contextlib import redirect_stdout
 from io import StringIO
 
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.soak import (
-    Level,
-    Soaked,
-    between_laps,
-    complaints,
-    growth,
-    read_level,
-)
+from benchmarks.soak import growth
 from tasks import register_task
 from tests.data import leaking_tasks
 from tests.fresh_process import in_fresh_process
 
 SMALL = ["--envs", "2", "--workers", "1", "--steps", "1"]
-
-
-def level(memory: float = 0.0, descriptors: float = 0.0) -> Level:
-    return Level(memory, descriptors, 1, 0, 0)
 
 
 def soaked(task_id: str, leaking: type | None = None) -> tuple[int, list[str]]:
@@ -61,85 +45,6 @@ def test_a_task_that_leaks_is_reported(leaking, quantity):
         f"GROWS: Leaking-v1: {quantity} in this process",
         f"GROWS: {quantity} of this process, from lap to lap",
     ]
-
-
-def test_laps_are_compared_task_by_task():
-    """Tasks need more or less, and one may keep a piece of memory by chance."""
-    first, second, third = found = [Soaked(name) for name in "abc"]
-    first.after = [level(100), level(200), level(202), level(204)]
-    second.after = [level(500), level(510), level(510), level(514)]
-    third.after = [level(100), level(100), level(190), level(190)]
-    for task in found:
-        task.workers, task.rounds = [[level()]], [[level()]]
-    assert between_laps(found).memory == 2
-    assert complaints(found) == ["memory of this process, from lap to lap"]
-    third.after = second.after = first.after = [level(1), level(2), level(2), level(2)]
-    assert complaints(found) == []
-
-
-@contextmanager
-def a_file():
-    with open(os.devnull):
-        yield
-
-
-@contextmanager
-def memory():
-    kept = [b"x" * 20_000_000]
-    yield
-    kept.clear()
-
-
-@contextmanager
-def a_thread():
-    over = threading.Event()
-    thread = threading.Thread(target=over.wait)
-    thread.start()
-    yield
-    over.set()
-    thread.join()
-    while os.path.exists(f"/proc/self/task/{thread.native_id}"):  # the system's end comes later
-        time.sleep(0.001)
-
-
-@contextmanager
-def a_process_that_was_not_waited_for():
-    process = subprocess.Popen([sys.executable, "-c", ""], stdin=subprocess.DEVNULL)
-    yield
-    process.wait()
-
-
-@contextmanager
-def shared_memory():
-    descriptor = os.memfd_create("a-test")
-    yield
-    os.close(descriptor)
-
-
-def levels_around(held) -> tuple[Level, Level, Level]:
-    before = read_level()
-    with held():
-        during = read_level()
-    return before, during, read_level()
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("held", "expected"),
-    [
-        (a_file, {"descriptors": 1}),
-        (memory, {"memory": pytest.approx(20e6 / 2**20, abs=1)}),
-        (a_thread, {"threads": 1}),
-        (a_process_that_was_not_waited_for, {"processes": 1}),
-        (shared_memory, {"descriptors": 1, "shared": 1}),
-    ],
-)
-def test_what_is_held_is_counted(held, expected):
-    before, during, after = in_fresh_process(levels_around, held)
-    for name in ("descriptors", "threads", "processes", "shared"):
-        assert getattr(during, name) - getattr(before, name) == expected.get(name, 0)
-        assert getattr(after, name) == getattr(before, name)
-    assert during.memory - before.memory == expected.get("memory", pytest.approx(0, abs=1))
 
 
 @pytest.mark.parametrize(

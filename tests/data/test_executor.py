@@ -18,7 +18,6 @@ from robot_layouts.data.playing.executor import (
     ProcessExecutor,
     WorkerError,
     choose_executor,
-    play_all,
 )
 from robot_layouts.data.playing.scheduler import Event
 from robots import TaskError

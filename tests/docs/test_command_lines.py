@@ -166,6 +166,22 @@ def test_the_commands_of_the_gallery_are_understood():
     assert problems(*GALLERY) == []
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("robot-layouts evaluate expert --task X-v1", "unrecognized arguments: expert"),
+        ("A=1 robot-layouts record --task X-v1", "required: --episodes, --out"),
+        ("python -m layouts shwo", "Did you mean 'show'"),
+        ('make bench ARGS="--recrod"', "unrecognized arguments: --recrod"),
+        ("pip install 'robot-layouts[veiw]'", "no extra veiw"),
+    ],
+)
+def test_a_wrong_command_is_found_and_told(tmp_path, line, words):
+    (tmp_path / "page.md").write_text(f"```console\n$ robot-layouts tasks list\n$ {line}\n```\n")
+    (found,) = problems(tmp_path / "page.md")
+    assert words in found
+
+
 EXAMPLES = [line for line in lines_of(*PAGES) if re.match(r"python examples/", line)]
 
 
@@ -178,56 +194,3 @@ def test_an_example_understands_its_words(line, monkeypatch):
     if "mappo" in script:
         pytest.importorskip("torchrl", reason="no extra brings it")
     parsed(lambda: runpy.run_path(str(ROOT / script), run_name="__main__"))
-
-
-class TestTheReader:
-    PAGE = """\
-Type `robot-layouts
-record` or `make docs`, not `makes`.
-
-    robot-layouts robots list > robots.txt
-
-```console
-$ PYTHONPATH=. robot-layouts evaluate \\
-    --task X-v1   # a remark
-first$ robot-layouts tasks list
-robot-layouts tasks lost
-$ ssh there 'A=1 robot-layouts robots fetch --check'
-```
-
-```python
-make = "robot-layouts demo"
-```
-"""
-
-    def test_it_finds_commands(self):
-        assert list(typed(self.PAGE)) == [
-            "PYTHONPATH=. robot-layouts evaluate --task X-v1   # a remark",
-            "robot-layouts tasks list",
-            "robot-layouts tasks lost",
-            "A=1 robot-layouts robots fetch --check",
-            "robot-layouts robots list > robots.txt",
-        ]
-        assert list(named(self.PAGE)) == ["make docs"]
-
-    @pytest.mark.parametrize(
-        ("line", "words"),
-        [
-            ("robot-layouts telop", "Did you mean 'teleop'"),
-            ("robot-layouts evaluate expert --task X-v1", "unrecognized arguments: expert"),
-            ("A=1 robot-layouts record --task X-v1", "required: --episodes, --out"),
-            ("robot-layouts portable robot-layouts demo --sedes 1", "Did you mean --seeds"),
-            ("python -m robot_layouts demo --sedes 1", "unrecognized arguments: --sedes"),
-            ("python -m layouts shwo", "Did you mean 'show'"),
-            ("python -m benchmarks placings", "Did you mean 'placing'"),
-            ("python -m parity compare --evry", "unrecognized arguments: --evry"),
-            ("make benhc", "no target benhc"),
-            ('make bench ARGS="--recrod"', "unrecognized arguments: --recrod"),
-            ("pip install 'robot-layouts[veiw]'", "no extra veiw"),
-            ("robot-layouts demo --seeds 1 && robot-layouts demo", ""),
-            ("python -m pytest --no-such-option", ""),
-        ],
-    )
-    def test_it_says_what_is_wrong(self, line, words):
-        assert words in problem(line)
-        assert bool(words) == bool(problem(line))

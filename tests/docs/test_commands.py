@@ -1,10 +1,7 @@
 """The commands' reference holds every command, and what its parser says."""
 
-import argparse
-
 import pytest
 
-from benchmarks.site.commands import _parser
 from benchmarks.site.hooks import COMMANDS as PLACE
 from benchmarks.site.hooks import on_page_markdown, on_post_page
 from robot_layouts.__main__ import PROGRAM
@@ -22,19 +19,6 @@ def test_every_command_is_there():
     assert all(f"\n### {name}\n" in developers for name in PROGRAM.for_developers)
     assert "\n## layouts validate\n" in users
     assert "`--episodes N`\n:   Number of episodes (required).\n" in users
-
-
-def test_a_parser_as_markdown():
-    parser = argparse.ArgumentParser("lab show", description="show ``it``", epilog="exit <code>")
-    parser.add_argument("what", metavar="WHAT", help="a file (%(default)s)", default="x.yaml")
-    parser.add_argument("--hidden", help=argparse.SUPPRESS)
-    parser.add_argument("--twice", action="store_true", help="do it twice.")
-    text = "\n".join(_parser(parser, "lab show", "###"))
-    assert text.startswith("Show `it`.\n\n```text\nlab show [-h]")
-    assert "`WHAT`\n:   A file (x.yaml).\n" in text
-    assert "`--twice`\n:   Do it twice.\n" in text
-    assert "Exit &lt;code>." in text
-    assert "hidden" not in text.replace("[--hidden", "")
 
 
 def test_nothing_is_loaded_from_elsewhere():

@@ -64,6 +64,13 @@ def test_links_and_paths_lead_somewhere(path):
     assert broken_in_text(path.read_text(encoding="utf-8"), path, ROOT) == []
 
 
+def test_what_leads_nowhere_is_named():
+    wrong = ["othr.md", "index.md#a-titel", "#there", "../pictures/b.png"]
+    text = "".join(f"[a]({link}) " for link in (*wrong, "index.md")) + "`docs/othr.md`"
+    found = broken_in_text(f"# Here\n[a](#here) {text}", ROOT / "docs/page.md", ROOT)
+    assert sorted(found) == sorted([*wrong, "docs/othr.md"])
+
+
 @pytest.mark.parametrize("page", sorted((ROOT / "docs/project").glob("*.md")), ids=lambda p: p.stem)
 def test_what_the_site_includes_has_links_that_lead_somewhere(page):
     name = page.relative_to(ROOT / "docs").as_posix()
@@ -79,46 +86,11 @@ def test_the_readme_declares_the_tutorials_task():
     assert declared == [(ROOT / "docs/tutorials/tray.py").read_text(encoding="utf-8")]
 
 
-class TestText:
-    @pytest.fixture
-    def root(self, tmp_path):
-        (tmp_path / "docs").mkdir()
-        (tmp_path / "docs" / "other.md").write_text("# A title: with `code`\n")
-        for made in ("runs", "data", "site", "assets_cache", ".venv"):
-            (tmp_path / made).mkdir()
-        return tmp_path
-
-    @pytest.mark.parametrize(
-        ("text", "broken"),
-        [
-            ("[a](other.md) ![b](other.md)", []),
-            ("[a](othr.md)", ["othr.md"]),
-            ("![b](../pictures/b.png)", ["../pictures/b.png"]),
-            ("[a](other.md#a-title-with-code)", []),
-            ("[a](other.md#a-titel)", ["other.md#a-titel"]),
-            ("# Here\n[a](#here)", []),
-            ("# Here\n[a](#there)", ["#there"]),
-            ("[a](https://example.org/x.md)", []),
-            ("see `docs/other.md`", []),
-            ("see `docs/othr.md`", ["docs/othr.md"]),
-            ("see `docs/NAME.md`, `outside/trajectory.h5`", []),
-            ("see `runs/demo`, `data/trajectory.h5`, `site/index.html`", []),
-            ("see `assets_cache/robots/panda.urdf`, `.venv/bin/python`", []),
-            ("```\n[a](othr.md) `docs/othr.md`\n```", []),
-        ],
-    )
-    def test_what_is_broken(self, root, text, broken):
-        assert broken_in_text(text, root / "docs" / "page.md", root) == broken
-
-
 @pytest.mark.parametrize(
     ("html", "address"),
     [
         ('<a href="https://example.org">', ""),
-        ('<img src="data:image/png;base64,AA==">', ""),
         ('<link rel="canonical" href="https://example.org">', ""),
-        ('<link href="a.css" rel="stylesheet">', ""),
-        ('<script src="https://example.org/a.js"></script>', "https://example.org/a.js"),
         ('<link rel="stylesheet" href="//example.org/a.css">', "//example.org/a.css"),
         ("<img alt=a src=http://example.org/a.png>", "http://example.org/a.png"),
     ],

@@ -1,10 +1,12 @@
 """Runs of the examples that learn: started as their users do, killed, and compared."""
 
+import importlib.util
 import os
 import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -30,6 +32,16 @@ def examples(monkeypatch):
     for name in set(sys.modules) - before:
         if (EXAMPLES / f"{name}.py").exists():
             del sys.modules[name]
+
+
+@contextmanager
+def loaded(name):
+    """Yield an example as a module of its name, which is forgotten afterwards."""
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules[name]
 
 
 def start(example, folder, *words, python=sys.executable):

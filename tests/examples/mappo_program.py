@@ -7,8 +7,6 @@ import mappo_two_arms as mappo
 import numpy as np
 import pytest
 import torch
-from tensordict import TensorDict
-from torch.optim import Adam
 from torchrl.envs import check_env_specs
 from torchrl_arms import OBSERVATION, Arms
 
@@ -44,41 +42,6 @@ def agents_are_those_of_pettingzoo() -> None:
     pair.close()
 
 
-def arms_that_explore_learn_what_is_rewarded() -> None:
-    """Without physics: an agent earns most by actions of the signs of what it observes."""
-    torch.manual_seed(0)
-    recipe, shape = mappo.Recipe(), (32, 100, 2)
-    networks = mappo.Networks(torch.arange(96).reshape(2, 48), 4, recipe)
-    loss = networks.loss(recipe)
-    optimizer = Adam(networks.parameters(), recipe.learning_rate)
-    means: list[float] = []
-    for _ in range(9):
-        steps = loss.actor_network(agents(shape, observation=torch.randn(*shape, 48)))
-        wanted = 0.4 * steps[OBSERVATION][..., :4].sign()
-        own = -(steps["agents", "action"] - wanted).square().sum(-1, keepdim=True)
-        reward = 0.02 * own.mean(2, keepdim=True).expand(*shape, 1)  # all earn the same
-        means.append(reward.mean().item())
-        never = torch.zeros(*shape, 1, dtype=torch.bool)
-        late = never.clone()
-        late[:, -1] = True
-        steps["next"] = agents(
-            shape,
-            observation=torch.randn(*shape, 48),
-            reward=networks.scaled(reward.detach()),
-            done=late,
-            terminated=never,
-        )
-        with torch.no_grad():
-            loss.value_estimator(steps)
-        mappo.improve(loss, optimizer, steps.detach().reshape(-1), recipe)
-        networks.normalized.look(steps[OBSERVATION])
-    assert means[-1] > 0.9 * means[0], means  # from -0.024 to -0.020; they are negative
-
-
-def agents(shape: tuple[int, ...], **parts: torch.Tensor) -> TensorDict:
-    return TensorDict({"agents": TensorDict(parts, batch_size=shape)}, batch_size=shape[:2])
-
-
 def agents_that_differ_are_refused() -> None:
     with pytest.raises(TaskError, match="left, right observe 48, 44 numbers and do 8, 7"):
         Arms(TASK, 1, 0, robots={"right": "panda_stick"})
@@ -105,7 +68,6 @@ if __name__ == "__main__":
     run = Path(sys.argv[1])
     torchrl_accepts_the_environment()
     agents_are_those_of_pettingzoo()
-    arms_that_explore_learn_what_is_rewarded()
     agents_that_differ_are_refused()
     an_actor_sees_its_own_arm(run)
     it_can_be_evaluated(run)

@@ -1,6 +1,5 @@
 """The example that learns from an expert's episodes."""
 
-import importlib.util
 import json
 import os
 import pickle
@@ -8,21 +7,16 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 
 pytest.importorskip("matplotlib")
 
-import tasks
 from robot_layouts.data import evaluate
-from robot_layouts.data.reading.recording import Recording
-from robot_layouts.kinematics.rotations import multiply
+from tests.examples.learning import EXAMPLES, ROOT, loaded
 
-ROOT = Path(__file__).parent.parent.parent
-EXAMPLE = ROOT / "examples" / "imitate.py"
+EXAMPLE = EXAMPLES / "imitate.py"
 TASK, MODE = "PushCube-v1", "pd_joint_pos"
 WORDS = [TASK, "--episodes", "2", "--steps", "60", "--examined", "1", "--tests", "2"]
 
@@ -31,12 +25,8 @@ pytestmark = pytest.mark.long  # they record and learn
 
 @pytest.fixture(scope="module")
 def example():
-    spec = importlib.util.spec_from_file_location("imitate", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["imitate"] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["imitate"]
+    with loaded("imitate") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")
@@ -78,14 +68,6 @@ def test_it_records_learns_and_leaves_its_files(example, learned, tmp_path, caps
     assert (tmp_path / "policy.pt").read_bytes() == (learned / "policy.pt").read_bytes()
 
 
-def test_another_seed_makes_other_weights(example, learned, recording, tmp_path):
-    words = [*WORDS, "--seed", "1", "--recording", str(recording), "--out", str(tmp_path)]
-    example.main(words)
-    found, other = weights(tmp_path), weights(learned)
-    assert not torch.equal(found["network.0.weight"], other["network.0.weight"])
-    assert torch.equal(found["linear.weight"], other["linear.weight"])
-
-
 def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, tmp_path):
     words = [*WORDS, "--recording", str(recording), "--out", str(tmp_path)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -101,42 +83,6 @@ def test_a_killed_run_goes_on_to_the_same_weights(example, learned, recording, t
     assert kept.read_bytes() == (learned / "policy.pt").read_bytes()
 
 
-def observed(example, recording):
-    """An episode as it was recorded, and what the network learns from it."""
-    observer = example.Observer(example.Recipe(TASK), example.Senses(TASK))
-    with Recording(recording / "trajectory.h5") as file:
-        episode = file[0]
-    seen, positions = observer(episode)
-    observer.env.close()
-    return episode, seen, positions
-
-
-def test_what_is_observed_is_what_the_expert_had_before_it(example, recording):
-    episode, seen, _ = observed(example, recording)
-    (arm,) = episode.states["articulations"].values()
-    assert len(seen) == len(episode.actions)
-    assert np.array_equal(seen[:, :9], arm[:-1, 13:22])
-
-
-def test_actions_become_the_positions_that_they_turn_to(example, recording):
-    episode, seen, positions = observed(example, recording)
-    turns = 0.1 * episode.actions[:, :7]  # rad: the range of pd_joint_delta_pos
-    assert np.allclose(positions[:, :7], seen[:, :7] + turns, atol=1e-6)
-    assert np.array_equal(positions[:, 7], episode.actions[:, 7])  # the gripper's
-
-
-def test_arms_are_shaken_and_grippers_are_not(example):
-    noise = example.shaking(example.Recipe("TwoRobotPickCube-v1", shake=0.3)).action_noise
-    assert set(noise) == {"left.arm", "right.arm"}
-    assert {size.std for size in noise.values()} == {0.3}
-
-
-def test_chunks_hold_the_last_action(example):
-    actions = np.arange(6, dtype=np.float32).reshape(3, 2)
-    chunks = example.chunks_of(actions, 2)
-    assert chunks.tolist() == [[0, 1, 2, 3], [2, 3, 4, 5], [4, 5, 4, 5]]
-
-
 def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
     policy = example.ClonedPolicy.load(learned / "policy.pt")
     how = {"control_mode": MODE, "obs_mode": "state_dict", "workers": 0}
@@ -144,45 +90,6 @@ def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
     beside = evaluate(pickle.loads(pickle.dumps(policy)), TASK, range(50, 53), num_envs=3, **how)
     assert alone.scores == beside.scores
     assert policy.file == str(learned / "policy.pt")
-
-
-def seen_in(task):
-    """What is observed after a reset."""
-    env = tasks.make(task, obs_mode="state_dict")
-    observation, _ = env.reset(seed=7)
-    env.close()
-    return observation
-
-
-def test_the_policy_looks_again_after_the_actions_it_plays(example, learned):
-    policy = example.ClonedPolicy.load(learned / "policy.pt")
-    still = seen_in(TASK)
-    first = [policy(still) for _ in range(policy.recipe.played)]
-    assert not torch.equal(first[0], first[1])
-    assert torch.equal(policy(still), first[0])
-
-
-def test_grippers_are_opened_or_closed_and_nothing_between(example, learned):
-    policy = example.ClonedPolicy.load(learned / "policy.pt")
-    played = torch.stack([policy(seen_in(TASK)) for _ in range(policy.recipe.played)])
-    assert set(played[:, 7].tolist()) <= {-1.0, 1.0}
-    assert not set(played[:, :7].flatten().tolist()) & {-1.0, 1.0}
-
-
-def test_a_cube_looks_the_same_after_a_quarter_turn(example):
-    senses, observation = example.Senses("StackCube-v1"), seen_in("StackCube-v1")
-    before = senses(observation)
-    pose = observation["extra"]["cubeA_pose"]
-
-    def turned(angle):
-        half = torch.tensor([0.5 * angle])
-        by = torch.cat([torch.cos(half), torch.zeros(2), torch.sin(half)])
-        quaternion = multiply(pose[:, 3:].numpy(), by.numpy())
-        again = torch.cat([pose[:, :3], torch.from_numpy(quaternion).float()], 1)
-        return senses({**observation, "extra": {**observation["extra"], "cubeA_pose": again}})
-
-    assert torch.allclose(turned(np.pi / 2), before, atol=1e-5)
-    assert not torch.allclose(turned(np.pi / 8), before, atol=1e-2)
 
 
 def test_a_folder_of_another_recipe_is_refused(example, learned, recording, capsys):
@@ -196,11 +103,3 @@ def test_a_recording_that_does_not_serve_is_refused(example, recording, tmp_path
     assert example.main(words) == 1
     assert "has 2 episodes, not 3" in capsys.readouterr().err
     assert not (tmp_path / "policy.pt").exists()
-
-
-def test_it_takes_a_task_of_the_present_folder(example, tmp_path, monkeypatch, capsys):
-    (tmp_path / "mine.py").write_text("")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    assert example.main(["mine:Tray-v1", "--out", "run"]) == 1
-    assert "Importing 'mine' registered no such task" in capsys.readouterr().err

@@ -1,9 +1,7 @@
 """The example that learns from what cameras see."""
 
 import json
-import pickle
 from contextlib import closing
-from dataclasses import replace
 
 import pytest
 import torch
@@ -12,7 +10,7 @@ pytest.importorskip("matplotlib")
 
 import tasks
 from robot_layouts.__main__ import main
-from robot_layouts.data import evaluate, record
+from robot_layouts.data import record
 from robot_layouts.data.reading.recording import Recording
 from robots import TaskError
 from tests.examples.learning import examples, finish, start
@@ -89,14 +87,6 @@ def test_a_recording_without_pictures_or_with_others_is_refused(example, learned
         example.load_pictures(tmp_path, recipe)
 
 
-def test_fewer_episodes_than_there_are_will_do(example, learned):
-    recipe = example.PictureRecipe(TASK, episodes=2, size=32)
-    both = example.load_pictures(learned / "recording", recipe)
-    one = example.load_pictures(learned / "recording", replace(recipe, episodes=1))
-    assert torch.equal(one, both[: len(one)])
-    assert len(one) < len(both)
-
-
 def test_a_receipt_of_what_was_learned_is_verified_with_its_pictures(
     example, learned, tmp_path, monkeypatch
 ):
@@ -120,28 +110,3 @@ def test_it_is_not_told_where_objects_are(example, learned):
     assert torch.equal(senses(observation), before)
     observation["agent"]["qpos"] += 1
     assert not torch.equal(senses(observation), before)
-
-
-def test_what_it_does_depends_on_what_it_sees(example, learned):
-    policy = example.SeeingPolicy.load(learned / "policy.pt")
-    env = tasks.make(TASK, **policy.making)
-    with closing(env):
-        sights = policy.sense(env.reset(seed=0)[0])
-    other = example.Sights(sights.numbers, sights.pictures.flip(3))
-    with torch.no_grad():
-        assert not torch.equal(policy._network(sights), policy._network(other))
-
-
-@pytest.mark.parametrize("size", [8, 33, 96])
-def test_pictures_may_be_of_any_size(example, size):
-    eye = example.Eye(3, size)
-    pictures = torch.zeros(2, 3, size, size, dtype=torch.uint8)
-    assert eye(pictures).shape == (2, example.SEEN)
-
-
-def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
-    policy = example.SeeingPolicy.load(learned / "policy.pt")
-    alone = evaluate(policy, TASK, range(50, 52), workers=0, **policy.making)
-    copy = pickle.loads(pickle.dumps(policy))
-    beside = evaluate(copy, TASK, range(50, 52), workers=0, num_envs=2, **policy.making)
-    assert alone.scores == beside.scores

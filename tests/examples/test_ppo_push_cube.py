@@ -1,30 +1,25 @@
 """The example that trains with Stable-Baselines3."""
 
-import importlib.util
 import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("stable_baselines3")
 pytest.importorskip("matplotlib")
 
-ROOT = Path(__file__).parent.parent.parent
-EXAMPLE = ROOT / "examples" / "ppo_push_cube.py"
+from tests.examples.learning import EXAMPLES, ROOT, loaded
+
+EXAMPLE = EXAMPLES / "ppo_push_cube.py"
 FILES = ["learning_curve.json", "learning_curve.png", "normalization.pkl", "policy.zip"]
 
 
 @pytest.fixture(scope="module")
 def example():
-    spec = importlib.util.spec_from_file_location("ppo_push_cube", EXAMPLE)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["ppo_push_cube"] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules["ppo_push_cube"]
+    with loaded("ppo_push_cube") as module:
+        yield module
 
 
 @pytest.mark.filterwarnings("ignore:You have specified a mini-batch size")

@@ -2,11 +2,6 @@
 
 import json
 import pickle
-import sys
-from contextlib import closing
-from dataclasses import replace
-from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +14,7 @@ import tasks
 from robot_layouts.data import evaluate
 from robot_layouts.data.playing.policies import find_policy
 from robots import TaskError
-from tests.examples.learning import (
-    assert_same,
-    examples,
-    finish,
-    kill_while_it_learns,
-    start,
-)
+from tests.examples.learning import assert_same, examples, finish, kill_while_it_learns, start
 
 __all__ = ["examples"]
 
@@ -73,14 +62,6 @@ def test_a_run_leaves_checkpoints_and_its_curve(ppo, tmp_path, capsys):
 
 
 @pytest.mark.long
-def test_it_learns_from_one_checkpoint_to_the_next(ppo, tmp_path):
-    ppo.run([*WORDS, "--workers", "0", "--out", str(tmp_path)])
-    states = [state(tmp_path / name)["policy"] for name in CHECKPOINTS]
-    weight = "action_net.weight"
-    assert all(not one[weight].equal(two[weight]) for one, two in pairwise(states))
-
-
-@pytest.mark.long
 def test_a_killed_run_and_another_have_the_same_weights(ppo, tmp_path):
     process = start("ppo_two_arms", tmp_path / "killed", *WORDS, "--workers", "1")
     kill_while_it_learns(process, tmp_path / "killed", 1)
@@ -89,31 +70,6 @@ def test_a_killed_run_and_another_have_the_same_weights(ppo, tmp_path):
     assert not list((tmp_path / "killed").glob("*.partial"))
     ppo.run([*WORDS, "--workers", "0", "--out", str(tmp_path / "whole")])
     assert_same(last(tmp_path / "killed"), last(tmp_path / "whole"))
-
-
-def test_every_checkpoint_has_worlds_of_its_own(ppo, tmp_path):
-    words = [*WORDS, "--task", "PushCube-v1", "--workers", "0", "--seed", "3"]
-    options = ppo.read_arguments("", "", words)
-    recipe = replace(ppo.RECIPES["PushCube-v1"], every=1)
-    with closing(ppo.PPOLearner(recipe, options)) as learner:
-        folders = [tmp_path / str(number) for number in range(3)]
-        for folder in folders:
-            folder.mkdir()
-        learner.begin(folders[0])
-        seeds = []
-        for number, (before, after) in enumerate(pairwise(folders)):
-            learner.learn(before, after, number, lambda _: None)
-            seeds += [info["seed"] for info in learner._env.reset_infos]
-    assert seeds == [10_300_000, 10_300_001, 10_300_002, 10_300_003]
-
-
-@pytest.mark.long
-def test_other_seeds_give_other_weights(ppo, tmp_path):
-    words = ["--steps", "200", *WORDS[2:], "--workers", "0", "--out"]
-    for seed in ("0", "1"):
-        ppo.run([*words, str(tmp_path / seed), "--seed", seed])
-    with pytest.raises(AssertionError):
-        assert_same(*(state(tmp_path / seed / CHECKPOINTS[1]) for seed in ("0", "1")))
 
 
 def test_a_run_goes_on_only_as_it_began(ppo, tmp_path, capsys):
@@ -146,19 +102,3 @@ def test_a_folder_without_checkpoints_is_named(ppo, tmp_path):
     with pytest.raises(TaskError) as raised:
         ppo.LearnedPolicy(tmp_path, ppo.FILES, ppo._loaded)(np.zeros((1, 66), np.float32))
     assert str(raised.value) == f"{tmp_path} holds no checkpoint; a run leaves some there"
-
-
-@pytest.mark.long
-def test_it_learns(tmp_path):
-    words = ["--task", "PushCube-v1", "--steps", "40000", "--workers", "2"]
-    finish(start("ppo_two_arms", tmp_path, *words))
-    curve = json.loads((tmp_path / "curve.json").read_text())
-    assert curve[-1]["reward"] > 1.5 * curve[0]["reward"]
-
-
-def test_a_task_of_the_present_folder_can_be_imported(ppo, tmp_path, monkeypatch):
-    (tmp_path / "my_task.py").write_text("")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    assert ppo.read_arguments("", "", ["--task", "my_task:Tray-v1"]).task == "my_task:Tray-v1"
-    assert find_spec("my_task")

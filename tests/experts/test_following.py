@@ -118,34 +118,29 @@ def task():
     return free_robots(LAYOUT)
 
 
-class TestWhatIsNoMotionForATask:
-    def test_other_robots(self, task):
-        other = face_to_face({"left": "panda", "middle": "xarm7"}, spacing=2.0)
-        with pytest.raises(
-            TaskError, match="the motion moves 'middle', a xarm7; the task has left"
-        ):
-            Follower(task, swing(other))
+OTHERS = face_to_face({"left": "panda", "middle": "xarm7"}, spacing=2.0)
+AWAY = face_to_face({"left": "panda", "right": "xarm7"}, spacing=3.0)
+SWING = swing(LAYOUT)
+BACKWARDS = replace(SWING, positions={name: rows[::-1] for name, rows in SWING.positions.items()})
+CARRIED = replace(SWING, held=(Held("left", box("cube", (0.04, 0.04, 0.04))),))
 
-    def test_another_place(self, task):
-        with pytest.raises(TaskError, match="a layout in which 'left' stands elsewhere"):
-            Follower(task, swing(face_to_face({"left": "panda", "right": "xarm7"}, spacing=3.0)))
 
-    def test_another_start(self, task):
-        motion = swing(LAYOUT)
-        backwards = {name: rows[::-1] for name, rows in motion.positions.items()}
-        with pytest.raises(TaskError, match="left's panda_joint1 is 0.216 from where the motion"):
-            Follower(task, replace(motion, positions=backwards))
+@pytest.mark.parametrize(
+    ("motion", "grippers", "message"),
+    [
+        (swing(OTHERS), {}, "the motion moves 'middle', a xarm7; the task has left"),
+        (swing(AWAY), {}, "a layout in which 'left' stands elsewhere"),
+        (BACKWARDS, {}, "left's panda_joint1 is 0.216 from where the motion"),
+        (SWING, {"lefd": 1.0}, "'lefd'. Did you mean 'left'"),
+        (CARRIED, {}, r"carries 'cube'.*grippers=\{'left': -1.0\}"),
+    ],
+)
+def test_what_is_no_motion_for_a_task(task, motion, grippers, message):
+    with pytest.raises((TaskError, UnknownNameError), match=message):
+        Follower(task, motion, grippers)
 
-    def test_several_environments(self):
-        with pytest.raises(TaskError, match="followed in 1 environment; the task has 2"):
-            Follower(free_robots(LAYOUT, num_envs=2), swing(LAYOUT))
 
-    def test_an_arm_that_is_not_there(self, task):
-        with pytest.raises(UnknownNameError, match="'lefd'. Did you mean 'left'"):
-            Follower(task, swing(LAYOUT), {"lefd": 1.0})
-
-    def test_a_body_that_nothing_holds(self, task):
-        carried = replace(swing(LAYOUT), held=(Held("left", box("cube", (0.04, 0.04, 0.04))),))
-        with pytest.raises(TaskError, match=r"carries 'cube'.*grippers=\{'left': -1.0\}"):
-            Follower(task, carried)
-        Follower(task, carried, {"left": -1.0})
+def test_a_motion_is_followed_in_one_environment_by_whoever_holds_what_it_carries(task):
+    Follower(task, CARRIED, {"left": -1.0})
+    with pytest.raises(TaskError, match="followed in 1 environment; the task has 2"):
+        Follower(free_robots(LAYOUT, num_envs=2), SWING)

@@ -25,9 +25,7 @@ def test_it_succeeds_on_18_of_20_seeds(task_id: str):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "layout",
-    [three_kinds(), mixed(5, 0.85), mixed(8, 0.95)],
-    ids=("three", "five", "eight"),
+    "layout", [three_kinds(), mixed(5, 0.85), mixed(8, 0.95)], ids=("three", "five", "eight")
 )
 def test_the_baton_goes_round_mixed_rings(layout: Layout):
     assert len({placement.robot.name for placement in layout.values()}) >= 3

@@ -1,4 +1,4 @@
-"""The experts that pick, place and stack: how they grip, and what they refuse."""
+"""Experts of single tasks: with which robots they go, how they grip, and what they refuse."""
 
 from dataclasses import replace
 
@@ -8,27 +8,30 @@ import pytest
 import tasks
 from layouts import Layout, Placement
 from robot_layouts.experts import find_expert
-from robot_layouts.experts.grasps import cube_grips, held_at, is_near
-from robot_layouts.experts.rehearsal import Rehearsal, first_success
-from robot_layouts.experts.script import Scene, Waypoint
+from robot_layouts.experts.grasps import cube_grips, held_at
+from robot_layouts.experts.maniskill import push_t
+from robot_layouts.experts.rehearsal import Rehearsal
+from robot_layouts.experts.script import Waypoint
 from robot_layouts.kinematics.rotations import rotate
 from robots import RobotRegistry, TaskError
 from tasks.episode import play
-from tests.data.expert_plays import plan, task
+from tests.data.expert_plays import task
 
 pytestmark = pytest.mark.xdist_group("experts")  # they share plans
+
+GRIPPING = (
+    *("LiftPegUpright-v1", "PegInsertionSide-v1", "PickCube-v1", "PlaceSphere-v1"),
+    *("PlugCharger-v1", "PokeCube-v1", "PullCubeTool-v1", "StackCube-v1", "StackPyramid-v1"),
+)
 
 
 @pytest.mark.parametrize(
     ("task_id", "place"),
     [
-        ("PickCube-v1", "arm"),
         ("PickCubeSO100-v1", "arm"),
-        ("PlaceSphere-v1", "arm"),
-        ("StackCube-v1", "arm"),
-        ("StackPyramid-v1", "arm"),
+        ("TwoRobotPickCube-v1", "right"),
         ("TwoRobotStackCube-v1", "left"),
-        ("TwoRobotStackCube-v1", "right"),
+        *((name, "arm") for name in GRIPPING),
     ],
 )
 def test_an_arm_without_fingers_is_an_error(task_id, place):
@@ -52,11 +55,34 @@ def test_jaws_that_do_not_roll_are_an_error():
         find_expert("PickCubeSO100-v1")(env, 0)
 
 
-def test_a_cube_out_of_reach_is_an_error():
-    layout = Layout({"arm": Placement(RobotRegistry.load("panda"), position=(-3.0, 0.0, 0.0))})
-    env = tasks.make("StackCube-v1", layout=layout)
-    with pytest.raises(TaskError, match=r"^no plan: arm\.above cubeA is out"):
-        find_expert("StackCube-v1")(env, 0)
+@pytest.mark.parametrize(
+    "name", ["DrawTriangle-v1", "PullCube-v1", "PushCube-v1", "RollBall-v1", *GRIPPING]
+)
+def test_an_arm_too_far_away_is_an_error(name):
+    robot = task(name).layout["arm"].robot.name
+    env = tasks.make(name, layout=Layout({"arm": Placement(robot, position=(-3.0, 0.0, 0.0))}))
+    with pytest.raises(TaskError, match=r"^no plan: arm\.above.* is out"):
+        find_expert(name)(env, 0)
+
+
+def test_a_stick_too_far_away_is_an_error(monkeypatch):
+    monkeypatch.setattr(push_t, "ATTEMPTS", 1)
+    away = Layout({"arm": Placement("panda_stick", position=(-3.0, 0.0, 0.0))})
+    with pytest.raises(TaskError, match="^no plan: the T is out of reach"):
+        find_expert("PushT-v1")(tasks.make("PushT-v1", layout=away), 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "robot"),
+    [
+        *((name, "panda_stick") for name in ("PushCube-v1", "PullCube-v1", "RollBall-v1")),
+        ("RollBall-v1", "panda_wristcam"),
+        *((name, "panda") for name in ("PegInsertionSide-v1", "PlugCharger-v1")),
+    ],
+)
+def test_other_robots_solve_it_as_well(name, robot):
+    env = tasks.make(name, robots={"arm": robot})
+    assert play(env, 0, find_expert(name)(env, 0)).solved
 
 
 @pytest.mark.long
@@ -99,15 +125,6 @@ def test_what_is_held_ends_where_it_was_asked_to(rehearsal):
         np.testing.assert_allclose(position + _axes(quaternion) @ in_gripper, place, atol=1e-6)
 
 
-def test_near_means_every_axis(rehearsal):
-    scene = rehearsal.begin(3)
-    offset = scene.body("cubeA")[0] - scene.body("cubeB")[0]
-    assert is_near(scene, "cubeA", "cubeB", offset, 1e-6)
-    for axis in np.eye(3):
-        assert is_near(scene, "cubeA", "cubeB", offset + 0.009 * axis, 0.01)
-        assert not is_near(scene, "cubeA", "cubeB", offset + 0.011 * axis, 0.01)
-
-
 def test_two_waypoints_of_one_name_are_refused(rehearsal):
     rehearsal.begin(0)
     with pytest.raises(TaskError, match=r"2 waypoints are called 'arm\.wait'; one may be"):
@@ -120,28 +137,6 @@ def test_a_waypoint_that_takes_too_long_ends_the_attempt(rehearsal):
     attempt = rehearsal.play(script)
     assert attempt.reason == "arm.wait took more than 7 steps"
     assert len(attempt.actions) == 7
-
-
-def test_a_waypoint_in_time_goes_on(rehearsal):
-    rehearsal.begin(0)
-    attempt = rehearsal.play({"arm": (Waypoint("wait", steps=5, most=7), Waypoint("rest"))})
-    assert attempt.reason == "the episode ended at arm.rest"
-
-
-def test_the_pyramid_stands_on_two_cubes():
-    """Native also counts a blue cube that is lower; the expert's is higher by an edge."""
-    env = task("StackPyramid-v1")
-    play(env, 0, plan("StackPyramid-v1", 0))
-    scene = Scene(env)
-    for base in ("cubeA", "cubeB"):
-        assert scene.body("cubeC")[0][2] - scene.body(base)[0][2] == pytest.approx(0.04, abs=0.003)
-
-
-def test_first_success_takes_what_the_first_style_leaves(rehearsal):
-    """A script that cannot go on is followed by the next."""
-    stuck = {"arm": (Waypoint("wait", until=lambda scene: False, most=3),)}
-    actions = first_success(task("StackCube-v1"), 0, lambda scene: [stuck, {}])
-    assert len(actions) == task("StackCube-v1").max_episode_steps
 
 
 def _axes(quaternion: np.ndarray) -> np.ndarray:

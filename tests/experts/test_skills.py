@@ -18,7 +18,6 @@ from robot_layouts.experts import (
     insert,
     lift,
     lift_together,
-    operate,
     place,
     point_at,
     pour,
@@ -138,20 +137,6 @@ def test_closed_fingers_press_a_button():
     played(env, {"arm": pressed})
     with pytest.raises(UnknownNameError, match="cap"):
         press(env, "arm", "bell", button, "lid", 0.006, point=button.point("top"))
-
-
-class Dial(OneArm):
-    dial = Object("dial", kind="kinematic", spawn=Area(x=-0.1))
-
-    def evaluate(self, state):
-        """Success: it is turned."""
-        return {"success": state.joint("dial", "knob") > 0.7}
-
-
-def test_a_dial_is_turned_by_what_the_arm_holds_of_it():
-    env, dial = made(Dial), load("dial")
-    taken = grasp(env, "arm", "dial", dial, moving={"knob": 0.8})
-    played(env, {"arm": (*taken, *operate(env, "arm", "dial", "knob", 0.8))})
 
 
 class Socket(OneArm):

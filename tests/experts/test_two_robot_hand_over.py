@@ -6,9 +6,7 @@ import pytest
 import tasks
 from layouts import face_to_face
 from robot_layouts.experts import find_expert
-from robot_layouts.experts.hands import Hand, between, box_grips
-from robot_layouts.experts.rehearsal import Rehearsal
-from robot_layouts.kinematics.rotations import rotation_about
+from robot_layouts.experts.hands import Hand
 from robots import TaskError
 from tasks.episode import play
 
@@ -29,16 +27,6 @@ def test_a_cube_out_of_reach_is_said_to_be():
 
     with pytest.raises(TaskError, match="'left' cannot reach the cube"):
         expert(Away(Away.scenario), 0)
-
-
-def test_a_box_is_held_by_any_two_faces_from_all_sides():
-    turn = rotation_about((0.0, 0.0, 1.0), np.array(0.3))
-    grips = box_grips(turn, around=8)
-    assert grips.shape == (48, 3, 3)
-    assert np.allclose(np.linalg.det(grips), 1.0)
-    faces = np.abs(np.einsum("ij,nj->ni", turn.T, grips[:, :, 1]))
-    assert np.allclose(np.sort(faces, axis=1), (0.0, 0.0, 1.0), atol=1e-12)
-    assert between(grips[0], grips[0]) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("robot", ["panda", "so100"])
@@ -74,15 +62,6 @@ def test_a_cube_that_slips_is_held_more_firmly():
     firm = hand.grip(0.025, 0.4, firmness=2.5)
     assert firm is not None
     assert firm.firmness == 2.5
-
-
-def test_a_posture_of_an_arm_leaves_all_other_joints_where_they_are():
-    env = tasks.make(TASK)
-    hand, scene = Hand(env, "left"), Rehearsal(env).begin(0)
-    posture = np.arange(9.0)
-    like = hand.like(scene, posture)
-    assert np.array_equal(like[:7], posture[:7])
-    assert np.array_equal(like[7:], scene.qpos("left")[7:])
 
 
 @pytest.mark.long

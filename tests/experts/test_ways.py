@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 import tasks
-from objects.shapes import Box, Capsule, Cylinder, Plane, Sphere
 from robot_layouts.experts import first_success
 from robot_layouts.experts.geometry import gripper_facing
-from robot_layouts.experts.obstacles import _corners, obstacles
 from robot_layouts.experts.rehearsal import Rehearsal
 from robot_layouts.experts.script import CLOSED, Pose, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
 from robot_layouts.experts.ways import NoWayError, Ways
-from robot_layouts.kinematics.rotations import transform
 
 HALF_PI = np.pi / 2
 MIDDLE = np.array([0.0, 0.0, 0.3])
@@ -123,33 +120,6 @@ def test_bodies_are_in_the_way_unless_the_hand_is_at_them():
 
     assert len(way_to(cube)) == 1
     assert len(way_to(beside[1])) > 1
-
-
-@pytest.mark.parametrize(
-    ("shape", "least", "greatest"),
-    [
-        (Box(half_size=(0.1, 0.2, 0.3)), (-0.1, -0.2, -0.3), (0.1, 0.2, 0.3)),
-        (Sphere(radius=0.1), (-0.1,) * 3, (0.1,) * 3),
-        (Cylinder(radius=0.1, half_length=0.3), (-0.3, -0.1, -0.1), (0.3, 0.1, 0.1)),
-        (Capsule(radius=0.1, half_length=0.3), (-0.4, -0.1, -0.1), (0.4, 0.1, 0.1)),
-        (Plane(), (-20, -10, -10), (0, 10, 10)),
-    ],
-)
-def test_shapes_are_where_they_are(shape, least, greatest):
-    corners = _corners(shape)
-    np.testing.assert_allclose(corners.min(axis=0), least, rtol=0.02)
-    np.testing.assert_allclose(corners.max(axis=0), greatest, rtol=0.02, atol=1e-9)
-
-
-def test_a_scene_s_bodies_stand_where_they_are(two_arms: Rehearsal):
-    scene = two_arms.begin(0)
-    found = obstacles(scene)
-    cube = found["cube"]
-    assert cube.name == "the cube"
-    np.testing.assert_allclose(
-        transform(np.asarray(cube.pose), cube.shapes[0]).mean(axis=0), scene.body("cube")[0]
-    )
-    assert "goal_site" not in found  # nothing can touch it
 
 
 def test_without_the_extra_the_reason_says_so(monkeypatch: pytest.MonkeyPatch):

@@ -4,18 +4,7 @@ import numpy as np
 import pytest
 
 from robot_layouts.kinematics.rotations import rotation_about, rotation_vector
-from robot_layouts.kinematics.solve import (
-    NEAR_ENOUGH,
-    IkGoal,
-    approach,
-    by_way,
-    descend_by_differences,
-    farthest,
-    nearby,
-    scattered,
-    solve,
-    turned_within,
-)
+from robot_layouts.kinematics.solve import NEAR_ENOUGH, IkGoal, approach, farthest, scattered, solve
 from robots import RobotRegistry
 from tests.catalogue import every_robot
 from tests.kinematics.robots_of_the_catalogue import random_qpos, tree_of
@@ -69,15 +58,6 @@ def test_each_start_may_have_a_goal_of_its_own():
     np.testing.assert_allclose(missing, found.missing, atol=1e-9)
 
 
-def test_few_iterations_do_not_get_there():
-    tree, free = tree_of("panda"), arm_of("panda")
-    tip = tree.link(RobotRegistry.load("panda").tcp_link)
-    far = starts_of("panda", 30)[29:]
-    goal = IkGoal(tree.forward(far)[0, tip, :3, 3], [tip])
-    assert not solve(tree, goal, starts_of("panda", 1), free, iterations=1).solved.any()
-    assert solve(tree, goal, starts_of("panda", 1), free).solved.any()
-
-
 def test_the_mean_of_links_is_brought_to_a_place():
     tree, free = tree_of("so100"), arm_of("so100")
     links = [tree.link(n) for n in RobotRegistry.load("so100").tcp_position_links]
@@ -111,22 +91,6 @@ def test_the_solution_with_the_shortest_way_comes_first():
     assert ways[0] < 1e-3
 
 
-def test_the_same_request_has_the_same_answer():
-    tree, free = tree_of("panda"), arm_of("panda")
-    goal = IkGoal(np.array([0.4, 0.1, 0.4]), [tree.link("panda_hand_tcp")])
-    one, other = (solve(tree, goal, starts_of("panda"), free) for _ in range(2))
-    np.testing.assert_array_equal(one.qpos, other.qpos)
-    np.testing.assert_array_equal(scattered(tree.limits, 5), scattered(tree.limits, 5))
-
-
-def test_infinite_limits_are_scattered_over_one_turn():
-    places = scattered(np.array([[-np.inf, np.inf], [0.0, 1.0]]), 1000)
-    assert np.abs(places[:, 0]).max() <= np.pi
-    assert np.ptp(places[:, 0]) > 6
-    assert (0 <= places[:, 1]).all()
-    assert (places[:, 1] <= 1).all()
-
-
 def test_no_posture_is_farther_than_the_farthest():
     tree, free = tree_of("panda"), arm_of("panda")
     tip = tree.link("panda_hand_tcp")
@@ -135,35 +99,6 @@ def test_no_posture_is_farther_than_the_farthest():
     most = np.hypot(places[:, 0], places[:, 1]).max()
     assert most < reach + 1e-4
     assert 0.97 * reach < most
-
-
-class TestParts:
-    def test_whole_turns_lead_into_the_limits(self):
-        low, high = np.array([-1.0, 5.0]), np.array([1.0, 7.0])
-        turned = turned_within(np.array([0.5 - 4 * np.pi, 6.0]), low, high)
-        assert turned is not None
-        np.testing.assert_allclose(turned, [0.5, 6.0])
-        assert turned_within(np.array([2.0, 6.0]), low, high) is None
-
-    def test_the_first_is_that_of_the_shortest_longest_way(self):
-        candidates = [np.array([3.0, 0.0]), np.array([2.0, 2.0])]
-        first, last = by_way(candidates, np.zeros(2))
-        assert first is candidates[1]
-        assert last is candidates[0]
-        assert by_way([], np.zeros(2)) == []
-
-    def test_places_nearby_differ_in_the_moving_joints_alone(self):
-        places = nearby(np.array([1.0, 2.0, 3.0]), [0, 2], 5, 0.1)
-        assert places.shape == (5, 3)
-        assert (places[:, 1] == 2.0).all()
-        assert 0 < np.abs(places[:, [0, 2]] - [1.0, 3.0]).max() < 0.5
-
-    def test_a_function_is_descended_by_its_values_alone(self):
-        def errors(x):
-            return np.array([x[0] ** 2 - 2, x[0] * x[1] - 3])
-
-        solution = descend_by_differences(errors, np.array([1.0, 1.0, 7.0]), [0, 1])
-        np.testing.assert_allclose(solution, [2**0.5, 3 / 2**0.5, 7.0], atol=1e-6)
 
 
 @pytest.mark.parametrize("robot", ["panda", "so100"])

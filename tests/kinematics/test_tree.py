@@ -17,12 +17,7 @@ from robots.urdf.reading import read_model
 from robots.urdf.summary import read_cleaned
 from robots.urdf.tree import kinematic_tree, link_index
 from tests.catalogue import every_robot
-from tests.kinematics.robots_of_the_catalogue import (
-    engine_poses,
-    random_qpos,
-    simulated,
-    tree_of,
-)
+from tests.kinematics.robots_of_the_catalogue import engine_poses, random_qpos, simulated, tree_of
 from tests.layouts.small_robots import joint, link, urdf
 
 seeds = st.integers(0, 2**32 - 1)

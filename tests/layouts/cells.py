@@ -1,9 +1,7 @@
 """A cell with a robot that stands askew, one on a wall, one under a ceiling, and two of a kind."""
 
 import io
-from itertools import combinations
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,6 +9,7 @@ import yourdfpy
 
 from layouts import Layout, Placement, ceiling, wall
 from robot_layouts.kinematics.rotations import pose_matrix
+from robots import RobotDescriptor
 
 
 def mixed_cell() -> Layout:
@@ -25,7 +24,7 @@ def mixed_cell() -> Layout:
     )
 
 
-def hung(robot: str) -> Layout:
+def hung(robot: str | RobotDescriptor) -> Layout:
     """One robot upside down under a ceiling, turned."""
     return Layout(
         {"arm": Placement(robot, (0.1, -0.2, 0.0), on="ceiling", rpy=(0.0, 0.0, 1.0))},
@@ -75,13 +74,3 @@ def _range(joint: yourdfpy.Joint) -> tuple[float, float]:
     if joint.limit is None or joint.limit.lower is None:
         return -np.pi, np.pi
     return max(joint.limit.lower, -np.pi), min(joint.limit.upper, np.pi)
-
-
-def overlapping(texts: list[Any]) -> list[tuple[str, str]]:
-    """Return pairs of matplotlib texts of one figure whose letters cover each other."""
-    boxes = [(text.get_text().strip(), text.get_window_extent()) for text in texts]
-    return [
-        (one, other)
-        for (one, first), (other, second) in combinations(boxes, 2)
-        if one and other and first.overlaps(second)
-    ]

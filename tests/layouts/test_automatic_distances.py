@@ -16,9 +16,6 @@ from tests.layouts import small_robots
 from tests.quick import quick_cases
 
 CLEAR = 0.05  # m, at the keyframes with joint noise
-# What two panda_wristcam that look at each other have at native's distance.
-CLEAR_IN_NATIVE = 0.03
-LOOKING = ("panda_wristcam", "panda_wristcam")
 
 WAYS: dict[str, Callable[[dict[str, str]], Layout]] = {
     "row": lambda robots: side_by_side(robots, spacing="auto"),
@@ -62,18 +59,6 @@ OTHER_SIZES = (
 @pytest.mark.parametrize("mix", quick_cases(SIZES + OTHER_SIZES, SIZES))
 def test_robots_keep_clear(way, mix):
     assert clearance(WAYS[way], mix.split("-")) >= CLEAR
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("first", ROBOTS)
-def test_any_two_and_three_keep_clear(way, first):
-    pairs = itertools.product([first], ROBOTS)
-    triples = ([first, *random.Random(first).choices(ROBOTS, k=2)] for _ in range(3))
-    for mix in [*pairs, *triples]:
-        mix = tuple(mix)
-        looking = mix[:2] == LOOKING and way in ("ring", "table")
-        assert clearance(WAYS[way], mix) >= (CLEAR_IN_NATIVE if looking else CLEAR), mix
 
 
 IN_A_RING = [*itertools.product(("panda", "koch", "fetch"), repeat=3)]
@@ -135,21 +120,11 @@ def test_a_robot_that_touches_itself_is_refused(tmp_path):
         side_by_side({"left": folded, "right": "panda"}, spacing="auto")
 
 
-def test_robots_of_the_catalogue_cost_no_check(monkeypatch):
-    monkeypatch.setattr(Layout, "validate", None)
-    assert ring({"a": "panda", "b": "koch"}) == ring({"a": "panda", "b": "koch"})
-
-
 def test_without_fcl_the_distance_is_that_of_reach(tmp_path, monkeypatch):
     robots = {"left": wide(tmp_path), "right": "panda"}
     monkeypatch.setitem(sys.modules, "fcl", None)
     reach = apart(robots["left"], RobotRegistry.load("panda"))
     assert side_by_side(robots, spacing="auto") == side_by_side(robots, spacing=reach)
-
-
-def test_hands_that_met_stand_clear():
-    two = {"a": "allegro_hand_right", "b": "allegro_hand_left"}
-    assert side_by_side(two, spacing="auto").validate(workspaces=False).ok
 
 
 def on_a_wheel(folder, height: float) -> RobotDescriptor:

@@ -10,13 +10,7 @@ import pytest
 
 import tasks
 from layouts import Layout, Placement, face_to_face
-from robots import (
-    CONTROL_MODES,
-    DescriptorError,
-    LayoutError,
-    RobotRegistry,
-    UnknownNameError,
-)
+from robots import CONTROL_MODES, DescriptorError, LayoutError, RobotRegistry, UnknownNameError
 
 DELTAS, POSE = "pd_joint_delta_pos", "pd_ee_delta_pose"
 PAIR = face_to_face({"left": "panda_wristcam", "right": "panda_wristcam"}, spacing=1.5)
@@ -94,10 +88,6 @@ def test_a_wrong_one_in_yaml_has_its_line():
         Layout.from_yaml(TEXT.replace(POSE, "pd_ee_delta_poses"))
 
 
-def test_without_one_a_layout_is_in_deltas():
-    assert PAIR.control_mode() == CONTROL_MODES[0]
-
-
 @pytest.mark.parametrize(
     "mode", [*CONTROL_MODES, {"left": POSE}, {"left": POSE, "right": "pd_joint_vel"}]
 )
@@ -117,16 +107,6 @@ def test_so_do_limbs():
     both = cell.in_control_mode({"right": POSE})
     assert both == Layout({"cell": Placement("baxter")}).in_control_mode(POSE)
     assert both.control_mode() == POSE
-
-
-def test_a_task_of_it_tells_it():
-    cell = PAIR.in_control_mode({"left": POSE})
-    with closing(tasks.make("TwoRobotPickCube-v1", layout=cell, obs_mode="none")) as task:
-        assert task.control_mode == {"left": POSE}
-        again = tasks.make("TwoRobotPickCube-v1", layout=task.layout, obs_mode="none")
-    with closing(again):
-        assert again.control_mode == {"left": POSE}
-        assert again.layout == task.layout
 
 
 def test_what_was_changed_since_is_refused():

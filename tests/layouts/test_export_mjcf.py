@@ -1,7 +1,6 @@
-"""MJCF of a layout, read as XML; `test_export_programs` has MuJoCo read and step it."""
+"""MJCF of a layout: read and stepped by MuJoCo, and what only its XML says."""
 
 from dataclasses import replace
-from itertools import combinations
 from xml.etree import ElementTree
 
 import numpy as np
@@ -10,13 +9,9 @@ import pytest
 from layouts import Layout, Placement, ceiling, single, table
 from layouts.export.cell import ExportedCell
 from layouts.export.mjcf import TIMESTEPS
-from robot_layouts.kinematics.rotations import pose_matrix
 from robots import AssetError, CameraMount, LayoutError
-from robots.bodies.hulls import load_model
-from tests.layouts.travelling import link_poses, outside
-
-# Numbers that MuJoCo needs are exact to the last bit when read back.
-EXACT = 1e-12  # m
+from tests.layouts.programs.mujoco_program import check
+from tests.layouts.travelling import outside
 
 
 def small_cell(folder):
@@ -52,53 +47,16 @@ def numbers(text):
     return [float(word) for word in text.split()]
 
 
-def world_poses(body, above):
-    """Yield each body's name and pose where all joints are at 0, in the world."""
-    position, quaternion = numbers(body.get("pos", "0 0 0")), numbers(body.get("quat", "1 0 0 0"))
-    pose = above @ pose_matrix(position, quaternion)
-    yield body.get("name"), pose
-    for child in body.findall("body"):
-        yield from world_poses(child, pose)
+def test_links_pairs_and_tools_are_there_and_hold_their_keyframe(cell, tmp_path):
+    """In MuJoCo, of one cell; `test_export_programs` looks at every cell."""
+    check("cell", cell, tmp_path)
 
 
-def test_bodies_are_where_the_links_are(cell, model):
-    found = dict(
-        pair for body in model.findall("worldbody/body") for pair in world_poses(body, np.eye(4))
-    )
-    compared = 0
-    for place, standing in ExportedCell.read(cell, visuals=False).robots.items():
-        zero = dict.fromkeys(standing.home, 0.0)
-        for link, pose in link_poses(standing, zero).items():
-            np.testing.assert_allclose(found[f"{place}/{link}"], pose, rtol=0, atol=EXACT)
-            compared += 1
-    assert compared == len(found) == 7 + 9
-
-
-def test_names_differ_and_meshes_are_there(path, model):
-    for kind in ("body", "joint", "site", "mesh", "position", "camera"):
-        names = [element.get("name") for element in model.iter(kind) if element.get("name")]
-        assert len(set(names)) == len(names) > 0
+def test_meshes_are_there(path, model):
     folder = path.parent / model.find("compiler").get("meshdir")
     files = {mesh.get("file") for mesh in model.findall("asset/mesh")}
     assert files == {f.relative_to(folder).as_posix() for f in folder.rglob("*.stl")}
     assert "Apache-2.0" in (folder / "LICENCES.md").read_text()
-
-
-def test_pairs_that_are_left_out_are_those_of_the_check(cell, model):
-    excluded = {frozenset((pair.get("body1"), pair.get("body2"))) for pair in model.find("contact")}
-    expected = set()
-    for place, placement in cell.items():
-        own = load_model(placement.robot)
-        links = {own.link_name(i) for i in range(len(own.hulls))}
-        counted = {frozenset(map(own.link_name, pair)) for pair in own.self_pairs}
-        expected |= {
-            frozenset(f"{place}/{link}" for link in pair)
-            for pair in combinations(links, 2)
-            if frozenset(pair) not in counted
-        }
-    assert excluded == expected
-    assert len(excluded) > 5
-    assert model.find("option/flag").get("filterparent") == "disable"
 
 
 def test_drives_limits_and_home_are_the_descriptors(cell, model):
@@ -205,8 +163,6 @@ def test_what_others_left_is_not_replaced(tmp_path):
     (tmp_path / "arm_assets" / "thesis.txt").touch()
     with pytest.raises(LayoutError, match=r"would be replaced, but holds thesis.txt"):
         single({"arm": "so100"}).to_mjcf(tmp_path / "arm.xml")
-    with pytest.raises(LayoutError, match=r"'arm.mjcf'; the name must end in .xml"):
-        single({"arm": "so100"}).to_mjcf(tmp_path / "arm.mjcf")
 
 
 def test_a_robot_whose_pictures_nobody_has_is_drawn_by_its_shapes(tmp_path, capsys):

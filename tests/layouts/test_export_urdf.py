@@ -1,6 +1,5 @@
 """The merged URDF of a layout, loaded back by other programs' readers."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -8,13 +7,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import yourdfpy
-from hypothesis import example, given
-from hypothesis import strategies as st
 
-from layouts import Layout, Placement, face_to_face, single
-from robot_layouts.kinematics.quaternions import normalised, quaternion_rpy, rpy_quaternion
-from robot_layouts.kinematics.rotations import pose_matrix
-from robots import AssetError, LayoutError, LocalUrdf, RobotRegistry
+from layouts import Layout, Placement, single
+from robots import AssetError, LocalUrdf, RobotRegistry
 from robots.urdf.summary import read_references
 from tests.catalogue import every_robot
 from tests.layouts.cells import hung, link_poses, mixed_cell, random_positions, skeleton
@@ -77,16 +72,6 @@ def test_links_of_any_robot_that_hangs_are_there(robot, tmp_path):
         for link, pose in link_poses(layout["arm"], positions).items():
             found = urdf.get_transform(f"arm/{link}", "world")
             np.testing.assert_allclose(found, pose, rtol=0, atol=1e-9)
-
-
-def test_there_is_one_tree_whose_names_are_distinct(cell, merged):
-    root = ElementTree.parse(merged).getroot()
-    assert root.get("name") == "cell"
-    for kind in ("link", "joint"):
-        names = [element.get("name") for element in root.iterfind(kind)]
-        assert len(set(names)) == len(names) > 40
-        assert {name.partition("/")[0] for name in names} - {"world"} == set(cell)
-    assert len(root.findall("link")) == len(root.findall("joint")) + 1
 
 
 def test_every_mesh_can_be_loaded(merged):
@@ -165,28 +150,6 @@ def test_robots_whose_looks_are_missing_can_be_saved_without(tmp_path):
         root = ElementTree.parse(path).getroot()
         assert root.find("link/visual") is None
         assert len(root.findall("link/collision")) > 8
-
-
-def test_a_wrong_ending_is_refused(tmp_path):
-    with pytest.raises(LayoutError, match=r"'cell.xml'; the name must end in .urdf"):
-        face_to_face({"a": "panda", "b": "panda"}, spacing=1.0).to_urdf(tmp_path / "cell.xml")
-    assert list(tmp_path.iterdir()) == []
-
-
-angles = st.floats(-math.pi, math.pi)
-
-
-@given(angles, st.sampled_from([-1, 1]) | st.floats(-1, 1), angles)
-@example(0.3, 1, -0.4)
-@example(0.3, -1, -0.4)
-@example(1.0, 1 - 1e-8, 2.0)
-def test_roll_pitch_and_yaw_are_the_quaternion(roll, share, yaw):
-    quaternion = normalised(rpy_quaternion((roll, share * math.pi / 2, yaw)))
-    again = rpy_quaternion(quaternion_rpy(quaternion))
-    origin = (0.0, 0.0, 0.0)
-    np.testing.assert_allclose(
-        pose_matrix(origin, again), pose_matrix(origin, quaternion), rtol=0, atol=1e-7
-    )
 
 
 def _position(positions: dict[str, dict[str, float]], name: str) -> float:

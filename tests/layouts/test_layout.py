@@ -31,11 +31,6 @@ class TestActionSplit:
         assert layout.action_split == {"left": slice(0, 8), "right": slice(8, 16)}
         assert layout.action_dim == 16
 
-    def test_different_robots_mix(self):
-        layout = face_to_face({"left": "panda", "right": "panda_stick"}, spacing=1.5)
-        assert layout.action_split == {"left": slice(0, 8), "right": slice(8, 15)}
-        assert layout.action_dim == 15
-
     def test_order_is_declared_not_sorted(self):
         layout = in_a_row({"b": "panda_stick", "a": "panda"})
         assert list(layout.action_split.items()) == [("b", slice(0, 7)), ("a", slice(7, 15))]
@@ -80,29 +75,15 @@ class TestReplaceRobots:
         assert replaced.action_split == {"left": slice(0, 8), "right": slice(8, 15)}
         assert layout["right"].robot.name == "panda_wristcam"
 
-    def test_a_descriptor_is_taken_as_it_is(self):
-        stick = RobotRegistry.load("panda_stick")
-        layout = face_to_face(PANDAS, spacing=1.5).replace_robots(left=stick)
-        assert layout["left"].robot is stick
-
     def test_unknown_place_names_the_places(self):
         layout = face_to_face(PANDAS, spacing=1.5)
         with pytest.raises(UnknownNameError, match="'rigt'.*'right'.*left, right"):
             layout.replace_robots(rigt="panda")
 
-    def test_unknown_robot_names_the_closest(self):
-        layout = face_to_face(PANDAS, spacing=1.5)
-        with pytest.raises(UnknownNameError, match="Did you mean 'panda_stick'"):
-            layout.replace_robots(right="panda_stik")
-
     def test_a_keyframe_the_new_robot_lacks_is_refused(self):
         layout = face_to_face(PANDAS, spacing=1.5, keyframe="tabletop")
         with pytest.raises(UnknownNameError, match="keyframe of panda_stick 'tabletop'"):
             layout.replace_robots(right="panda_stick")
-
-    def test_home_follows_the_robot(self):
-        layout = Layout({"arm": Placement("panda")}).replace_robots(arm="panda_wristcam")
-        assert layout["arm"].start_keyframe == "tabletop"
 
 
 class TestIdentity:
@@ -110,18 +91,6 @@ class TestIdentity:
         one, other = (face_to_face(PANDAS, spacing=1.5) for _ in range(2))
         assert one == other
         assert hash(one) == hash(other)
-
-    def test_order_matters(self):
-        layout = face_to_face(PANDAS, spacing=1.5)
-        reversed_layout = Layout(dict(reversed(list(layout.items()))))
-        assert layout != reversed_layout
-
-    def test_distance_matters(self):
-        assert face_to_face(PANDAS, spacing=1.5) != face_to_face(PANDAS, spacing=1.4)
-
-    def test_a_dict_is_not_a_layout(self):
-        layout = face_to_face(PANDAS, spacing=1.5)
-        assert layout != dict(layout)
 
     @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy])
     def test_copies_are_equal(self, duplicate):
@@ -143,12 +112,6 @@ class TestIdentity:
         with pytest.raises(TypeError):
             layout["left"] = layout["right"]
 
-    def test_changing_the_mapping_it_was_made_from_does_not_change_it(self):
-        placements = {"arm": Placement("panda")}
-        layout = Layout(placements)
-        placements["other"] = Placement("panda")
-        assert list(layout) == ["arm"]
-
 
 class TestRefusals:
     def test_no_robot(self):
@@ -160,10 +123,6 @@ class TestRefusals:
         with pytest.raises(LayoutError, match=r"\['arm'\] are given twice"):
             Layout.of(("arm", arm), ("other", arm), ("arm", arm))
 
-    def test_pairs_keep_their_order(self):
-        arm = Placement("panda")
-        assert list(Layout.of(("b", arm), ("a", arm))) == ["b", "a"]
-
     @pytest.mark.parametrize("name", ["", "left arm", "left-arm", "1st", 7])
     def test_a_name_that_is_no_identifier(self, name):
         with pytest.raises(LayoutError, match="must be a letter followed by"):
@@ -173,18 +132,10 @@ class TestRefusals:
         with pytest.raises(LayoutError, match="'arm' is a str; a layout holds Placements"):
             Layout({"arm": "panda"})
 
-    def test_an_unknown_robot_names_the_closest_and_all(self):
-        with pytest.raises(UnknownNameError, match="Did you mean 'panda_stick'.*panda_wristcam"):
-            Placement("panda_stck")
-
     def test_an_unknown_name_is_a_key_error_with_the_choices(self):
         layout = face_to_face(PANDAS, spacing=1.5)
         with pytest.raises(KeyError, match="'lft'.*Did you mean 'left'.*left, right"):
             layout["lft"]
-
-    def test_an_unknown_keyframe_names_the_robot_and_the_choices(self):
-        with pytest.raises(UnknownNameError, match="keyframe of panda 'ret'.*'rest'"):
-            Placement("panda", keyframe="ret")
 
     @pytest.mark.parametrize("quaternion", [(0, 0, 0, 0), (1, 1, 0, 0), (1.01, 0, 0, 0)])
     def test_a_quaternion_that_is_no_rotation_tells_its_length(self, quaternion):

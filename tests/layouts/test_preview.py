@@ -6,22 +6,10 @@ import sys
 import numpy as np
 import pytest
 
-from layouts import (
-    Layout,
-    Placement,
-    around_table,
-    ceiling,
-    face_to_face,
-    grid,
-    ring,
-    side_by_side,
-    single,
-    wall,
-)
+from layouts import Layout, Placement, around_table, ceiling, face_to_face, grid, ring, single, wall
 from layouts.preview import WIDTH, draw
 from robot_layouts.core.figures import DOTS_PER_INCH, SUPPORTED
 from robots import LayoutError, MissingPackageError
-from tests.layouts.cells import overlapping
 
 
 def mixed(count):
@@ -32,9 +20,7 @@ def mixed(count):
 LAYOUTS = {
     "one": single({"arm": "panda"}),
     "two": face_to_face({"left": "panda_wristcam", "right": "panda_stick"}, spacing=1.5),
-    "three": side_by_side({"a": "panda", "b": "panda_stick", "c": "panda"}, spacing=0.7),
     "six": ring(mixed(6), radius=0.9),
-    "many": ring(mixed(13), radius=0.9),
     "eight": ring({**mixed(7), "small": "so100"}),
     "table": around_table(mixed(5)),
     "grid": grid(mixed(7)),
@@ -96,36 +82,6 @@ def test_every_robot_is_drawn_at_its_place_and_named_with_its_reach(name):
     assert box.width / (x_max - x_min) == pytest.approx(box.height / (y_max - y_min), rel=1e-6)
 
 
-def test_long_names_fit_into_the_list_and_the_plan():
-    robots = {"robot_of_a_very_long_name": "floating_panda_gripper", "b": "mobile_panda"}
-    figure = draw(grid(robots, spacing=8.765, columns=1).moved((-111.1, -22.2, 0.0)))
-    plan, listing = figure.axes
-    assert overlapping(listing.texts) == []
-    assert max(text.get_window_extent().x1 for text in listing.texts) < figure.bbox.x1
-    for text in plan.texts:
-        assert plan.bbox.x0 < text.get_window_extent().x0
-
-
-def test_overlap_is_darker_than_what_one_robot_reaches():
-    near = face_to_face({"left": "panda", "right": "panda"}, spacing=1.2)
-    figure = draw(near)
-    image, _ = pixels(near, figure)
-    in_overlap, in_one = (
-        image[len(image) - round(y), round(x)].sum()
-        for x, y in figure.axes[0].transData.transform([(0.1, 0.1), (0.1, 1.1)])
-    )
-    assert in_overlap < in_one - 30
-
-
-def test_robots_that_share_nothing_have_no_overlap_note():
-    far, near = (
-        draw(face_to_face({"left": "panda", "right": "panda"}, spacing=spacing)).axes[0]
-        for spacing in (3.0, 1.5)
-    )
-    assert far.get_title(loc="right") == ""
-    assert near.get_title(loc="right") == "grey: within reach of two or more"
-
-
 @pytest.mark.parametrize("name", ["one", "two", "six"])
 def test_a_png_of_the_promised_width(name, tmp_path):
     from matplotlib.image import imread
@@ -142,18 +98,6 @@ def test_other_formats(suffix, start, tmp_path):
     path = LAYOUTS["two"].preview(str(tmp_path / f"cell{suffix}"))
     assert path.read_bytes().startswith(start)
     assert {suffix} < set(SUPPORTED)
-
-
-def test_the_table_is_drawn_under_the_robots(tmp_path):
-    plain = draw(LAYOUTS["two"])
-    with_table = draw(LAYOUTS["two"], table=(-0.7, -1.2, 0.5, 1.2))
-    assert len(with_table.axes[0].patches) == len(plain.axes[0].patches) + 1
-
-
-@pytest.mark.parametrize("table", [(0, 0, 0, 1), (1, 0, 0, 1), (0, 0, math.nan, 1)])
-def test_a_table_that_is_no_rectangle(table, tmp_path):
-    with pytest.raises(LayoutError, match="must be x_min, y_min, x_max, y_max|takes 4 finite"):
-        LAYOUTS["two"].preview(tmp_path / "cell.png", table=table)
 
 
 @pytest.mark.parametrize("name", ["cell.jpg", "cell", "cell.png.txt"])
@@ -184,14 +128,3 @@ def test_a_failed_save_keeps_the_old_picture(monkeypatch, tmp_path):
         LAYOUTS["two"].preview(path)
     assert path.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["cell.png"]
-
-
-def test_a_table_of_frames_is_drawn():
-    layout = around_table({"arm": "panda"}, table=(2.0, 1.0)).moved(yaw=0.3)
-    image, _ = pixels(layout, draw(layout))
-    on_table, off_table = (
-        image[len(image) - round(y), round(x)].tolist()
-        for x, y in draw(layout).axes[0].transData.transform([(0.74, 0.648), (-0.9, 0.4)])
-    )
-    assert on_table != [255, 255, 255]
-    assert off_table == [255, 255, 255]

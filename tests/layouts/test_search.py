@@ -10,7 +10,6 @@ import layouts
 from layouts import ceiling, ring, search, table, wall
 from layouts.__main__ import main
 from layouts.layout import Layout
-from layouts.placing.bases import ground_of
 from layouts.placing.cost import requirements_of
 from robots import LayoutError, MissingPackageError, RobotLayoutsError, RobotRegistry
 from tests.layouts.small_robots import robot
@@ -52,10 +51,6 @@ class TestResult:
         assert found.volume > 1.3 * before.volume
 
     @pytest.mark.long
-    def test_it_can_be_written(self, pair):
-        assert Layout.from_yaml(pair.to_yaml()) == pair
-
-    @pytest.mark.long
     def test_another_process_gets_the_same(self, pair):
         code = (
             "from layouts import search; print(search("
@@ -63,10 +58,6 @@ class TestResult:
         )
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
         assert done.stdout.decode() == pair.to_yaml()
-
-    @pytest.mark.long
-    def test_another_seed_gets_others(self, pair):
-        assert search(PAIR, CUBE, reached_by="all", seed=1, **QUICK) != pair
 
 
 class TestWhoReaches:
@@ -94,13 +85,6 @@ class TestWhoReaches:
             ("c", (left, right)),
             ("d", (left, right, "arm")),
         ]
-
-    @pytest.mark.long
-    def test_robots_without_targets_stand_about_the_origin(self):
-        layout = search(PAIR, **QUICK)
-        places = np.array([placement.base_position for placement in layout.values()])
-        assert np.abs(places.mean(axis=0)).max() < 1e-3
-        assert layout.validate().shared
 
     def test_a_robot_from_a_urdf(self):
         path = RobotRegistry.load("xarm7").urdf.locate()
@@ -132,12 +116,6 @@ class TestOutOfReach:
     def test_two_that_no_place_serves(self):
         with pytest.raises(LayoutError, match="from which all targets are reached.*: arm stays"):
             search(PANDA, self.APART, **QUICK)
-
-    @pytest.mark.long
-    def test_one_of_two_is_better_than_none(self):
-        layout = search(PANDA, self.APART, partial=True, **QUICK)
-        reaches = layout.validate(targets=self.APART, workspaces=False).reaches
-        assert sum(reach.reached for reach in reaches) == 1
 
     def test_no_room(self):
         narrow = (-0.05, -0.05, 0.05, 0.05)
@@ -175,22 +153,6 @@ class TestGround:
         assert -1.0 <= y <= 1.0
         assert z == 0.2
         assert reached(layout, CUBE)
-
-    @pytest.mark.parametrize(
-        ("around", "within"),
-        [(None, None), (None, (0, 0, 1, 1)), (table(1, 0.5), None), ((0, 0, 1, 1), None)],
-    )
-    def test_the_grid_lies_where_bases_may_stand(self, around, within):
-        robots = {"arm": RobotRegistry.load("panda")}
-        ground = ground_of(around, within, 0.0, robots, [(0.0, 0.0, 0.1)])
-        bases = ground.grid()
-        assert 100 < len(bases) < 2500
-        assert len(set(bases)) == len(bases)
-        assert all(ground.surfaces[base.surface].allows(base.x, base.y) for base in bases)
-
-    def test_frames_and_robots_may_not_share_a_name(self):
-        with pytest.raises(LayoutError, match="'table' names both a robot and a frame"):
-            search({"table": "panda"}, CUBE, around=table(1.2, 0.8), **QUICK)
 
 
 @pytest.mark.parametrize(
@@ -240,14 +202,6 @@ def test_a_robot_that_touches_itself_is_refused(tmp_path):
         search({"arm": folded}, **QUICK)
 
 
-def test_a_long_search_tells_how_far_it_is(monkeypatch, capsys):
-    monkeypatch.setattr("robot_layouts.core.progress.PATIENCE", 0.0)
-    search({"arm": "so100"}, {"cube": (0.0, 0.0, 0.1)}, **QUICK)
-    said = capsys.readouterr().err
-    assert "looking for places: who can reach cube\n" in said
-    assert "looking for places: beginning 1, " in said
-
-
 @pytest.mark.long
 def test_the_function_is_no_module():
     assert callable(layouts.search)
@@ -273,16 +227,6 @@ class TestCommand:
         assert out == f"{layout}\n{report}\nlayout: {file}\npicture: {picture}\n"
         assert Layout.load(file) == layout
         assert picture.read_bytes().startswith(b"\x89PNG")
-
-    @pytest.mark.long
-    def test_who_reaches_what(self, capsys):
-        words = "left=panda right=so100 --target cube=0.1,0,0.15 --target bin=0,0.1,0.15"
-        status, out, _ = self.run(f"{words} --reached-by right --reached-by bin=left,right", capsys)
-        assert status == 0
-        (cube,) = [line for line in out.splitlines() if "cube (" in line]
-        (bin_,) = [line for line in out.splitlines() if "bin (" in line]
-        assert "right reaches it" in cube
-        assert "left reaches it, right reaches it" in bin_
 
     @pytest.mark.parametrize(
         ("words", "message"),

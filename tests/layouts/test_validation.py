@@ -8,45 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from layouts import (
-    Layout,
-    Placement,
-    around_table,
-    face_to_face,
-    side_by_side,
-    yaw_quaternion,
-)
+from layouts import Layout, Placement, around_table, side_by_side, yaw_quaternion
 from layouts.frames import Pose
-from layouts.validation.collisions import (
-    _measure,
-    nearest,
-    stand,
-    touching,
-)
-from robots import (
-    LayoutError,
-    MissingPackageError,
-    RobotRegistry,
-    UnknownNameError,
-)
+from layouts.validation.collisions import nearest, stand, touching
+from robots import LayoutError, MissingPackageError, RobotRegistry, UnknownNameError
 from robots.bodies.hulls import load_model
 from tests.catalogue import every_robot
-from tests.layouts.cells import overlapping
-from tests.layouts.small_robots import (
-    FOLDING,
-    TURNTABLE,
-    folding,
-    joint,
-    link,
-    robot,
-    turntable,
-    urdf,
-)
+from tests.layouts.small_robots import FOLDING, folding, joint, link, robot, turntable, urdf
 
 PANDAS = {"left": "panda", "right": "panda"}
 TURN = joint("turn", "base", "top", xyz="0 0 0.35")
 TABLE = (-0.7245, -1.209, 0.4845, 1.209)
-MIXED = ("panda", "panda_stick", "so100", "panda", "so100", "panda_stick", "so100", "panda")
 
 
 def pair(robot_, distance, **placement):
@@ -57,21 +29,6 @@ def pair(robot_, distance, **placement):
             for name, y in (("one", 0.0), ("other", distance))
         }
     )
-
-
-def circle(kinds, radius):
-    """Robots around a centre that they face."""
-    placements = {}
-    for i, kind in enumerate(kinds):
-        angle = 2 * math.pi * i / len(kinds)
-        ahead = math.pi / 2 if kind == "so100" else 0.0  # it reaches out along its own -y
-        placements[f"arm_{i}"] = Placement(
-            kind,
-            (radius * math.cos(angle), radius * math.sin(angle), 0.0),
-            yaw_quaternion(angle + math.pi + ahead),
-            keyframe="rest",
-        )
-    return Layout(placements)
 
 
 def kinds(report):
@@ -108,23 +65,6 @@ class TestPandas:
         nearer = side_by_side(PANDAS, spacing=advised - 0.02).validate(workspaces=False)
         assert nearer.findings
 
-    def test_four_robots_over_a_table(self):
-        layout = circle(("panda", "panda_stick", "panda_wristcam", "so100"), 0.9)
-        report = layout.validate(table=(-1.5, -1.5, 1.5, 1.5), targets=[(0.3, 0.0, 0.3)])
-        assert report.ok
-        assert len(report.clearances) == 6 + 4
-
-    def test_eight_mixed_robots_in_a_ring(self):
-        report = circle(MIXED, 1.2).validate()
-        assert report.ok, str(report)
-        assert len(report.clearances) == 28
-        assert "and 16 pairs that stay farther apart" in str(report)
-
-    def test_eight_in_too_small_a_ring_are_refused(self):
-        report = circle(MIXED, 0.5).validate(workspaces=False)
-        assert not report.ok
-        assert "collision" in kinds(report)
-
 
 class TestDistances:
     def test_between_boxes_they_are_exact(self, tmp_path):
@@ -154,30 +94,6 @@ class TestDistances:
         assert (finding.kind, finding.serious) == ("clearance", False)
         assert finding.amount == pytest.approx(0.015)
         assert "0.010 m farther apart (0.125 m between their bases" in finding.advice
-
-    def test_the_nearest_boxes_need_not_be_those_of_the_nearest_bounds(self, tmp_path):
-        """The turned tops' boxes along the axes are 11.3 cm apart, but the tops 11.7 cm."""
-        text = TURNTABLE.replace('size="0.1 0.1 0.1"', 'size="0.1 0.135 0.1"', 1)
-        arm = robot(tmp_path, text, ["turn"], rest=[math.pi / 6])
-        (between,) = pair(arm, 0.25).validate(samples=0, workspaces=False).clearances
-        assert between.links == ("base", "base")
-        assert between.distance == pytest.approx(0.115, abs=1e-9)
-
-    def test_one_above_the_other_is_moved_the_shorter_way(self, tmp_path):
-        """Their boxes are 10 cm wide, and 10 cm and 40 cm high; they overlap by 5 cm in height."""
-        arm = turntable(tmp_path)
-        layout = Layout({"one": Placement(arm), "other": Placement(arm, (0.01, 0.0, 0.35))})
-        (finding,) = layout.validate(samples=0, workspaces=False).findings
-        assert "0.070 m farther apart vertically (0.420 m between" in finding.advice
-
-    def test_turned_boxes_are_moved_no_farther_than_they_need(self, tmp_path):
-        """Their sides face each other, though not along the world's axes."""
-        arm, half = turntable(tmp_path), 0.5**0.5
-        corner = {"one": 0.0, "other": 0.095 * half}
-        turned = yaw_quaternion(math.pi / 4)
-        placements = {n: Placement(arm, (x, x, 0), turned) for n, x in corner.items()}
-        (finding,) = Layout(placements).validate(samples=0, workspaces=False).findings
-        assert "0.030 m farther apart (0.125 m between" in finding.advice
 
     @pytest.mark.parametrize("seed", range(6))
     def test_the_nearest_links_are_the_nearest_of_all(self, seed):
@@ -211,81 +127,18 @@ class TestDistances:
         assert nearest(*bodies).distance == pytest.approx(min(distances), abs=1e-9)
         assert len(touching(*bodies)) == sum(distance < 0 for distance in distances)
 
-    def test_a_mesh_counts_as_its_convex_hull(self, tmp_path):
-        import trimesh
-
-        sides = [trimesh.creation.box(bounds=b) for b in ([[0, 0, 0], [1, 0.1, 0.1]],)]
-        sides.append(trimesh.creation.box(bounds=[[0, 0, 0], [0.1, 1, 0.1]]))
-        trimesh.util.concatenate(sides).export(tmp_path / "corner.stl")
-        shape = '<mesh filename="corner.stl" scale="0.1 0.1 0.1"/>'
-        text = urdf(link("base", shape), link("top", ""), joint("turn", "base", "top"))
-        arm = robot(tmp_path, text, ["turn"])
-        placements = {
-            "one": Placement(arm, (0, 0, 0), (1, 0, 0, 0)),
-            "other": Placement(arm, (0.2, 0.2, 0), yaw_quaternion(math.pi)),
-        }
-        (between,) = Layout(placements).validate(workspaces=False).clearances
-        # The L's own distance would be larger: its hull is cut off by the line from tip to tip.
-        assert between.distance == pytest.approx((0.2 - 0.11) * math.sqrt(2), abs=1e-5)
-
     @pytest.mark.parametrize("shape", ['<cylinder radius="0.05" length="0.1"/>'])
     def test_round_shapes_are_nearly_round(self, shape, tmp_path):
         text = urdf(link("base", shape), link("top", ""), joint("turn", "base", "top"))
         (between,) = pair(robot(tmp_path, text, ["turn"]), 0.3).validate().clearances
         assert between.distance == pytest.approx(0.2, abs=5e-4)
 
-    @pytest.mark.parametrize("move", [(0.0, 0.0, 0.0, 1.0), (1.5, -2.0, 0.3, 2.5)])
-    def test_a_layout_moved_as_a_whole_keeps_them(self, move):
-        *shift, yaw = move
-        layout = face_to_face({"left": "panda", "right": "so100"}, spacing=0.8)
-        turned = {}
-        for name, placement in layout.items():
-            x, y, z = placement.base_position
-            w, _, _, k = placement.base_quaternion
-            angle = 2 * math.atan2(k, w) + yaw
-            c, s = math.cos(yaw), math.sin(yaw)
-            place = (c * x - s * y + shift[0], s * x + c * y + shift[1], z + shift[2])
-            turned[name] = replace(placement, position=place, quaternion=yaw_quaternion(angle))
-        (before,), (after,) = (
-            one.validate(workspaces=False).clearances for one in (layout, Layout(turned))
-        )
-        assert after.distance == pytest.approx(before.distance, abs=1e-6)
-        assert after.links == before.links
-        assert after.noisy_distance == pytest.approx(before.noisy_distance, abs=1e-6)
-
-
-def nearest_of_all(one, other):
-    """Return the least distance of all hulls in all postures, each measured."""
-    places = np.ndindex(len(one.poses), len(one.hulls), len(other.hulls))
-    return min(_measure(one, other, *place).distance for place in places)
-
-
-class TestNearest:
-    """What is left out of the measuring, because planes or boxes part it, is never the nearest."""
-
-    def standing(self, name, kind, random, place):
-        robot_ = RobotRegistry.load(kind)
-        limits = np.clip(load_model(robot_).kinematics.limits, -2.0, 2.0)
-        qpos = random.uniform(*limits.T, (3, len(limits)))
-        pose = Pose(place, yaw_quaternion(random.uniform(0, 6)))
-        return stand(name, pose, load_model(robot_), qpos)
-
-    @pytest.mark.parametrize("distance", [0.3, 0.6, 1.2, 3.0])
-    @pytest.mark.parametrize("kinds", [("so100", "koch"), ("panda_stick", "so100")])
-    def test_it_is_the_nearest_of_all(self, kinds, distance):
-        random = np.random.default_rng(round(distance * 10))
-        one = self.standing("one", kinds[0], random, (0.0, 0.0, 0.0))
-        other = self.standing("other", kinds[1], random, (distance, 0.2, 0.1))
-        expected = nearest_of_all(one, other)
-        first = nearest(one.first, other.first)
-        for known in (None, first):
-            assert nearest(one, other, None, known).distance == pytest.approx(expected, abs=1e-9)
-
-    def test_beyond_ten_metres_there_is_none(self):
-        random = np.random.default_rng(0)
-        one = self.standing("one", "so100", random, (0.0, 0.0, 0.0))
-        other = self.standing("other", "so100", random, (30.0, 0.0, 0.0))
-        assert nearest(one, other) is None
+    def test_one_above_the_other_is_moved_the_shorter_way(self, tmp_path):
+        """Their boxes are 10 cm wide, and 10 cm and 40 cm high; they overlap by 5 cm in height."""
+        arm = turntable(tmp_path)
+        layout = Layout({"one": Placement(arm), "other": Placement(arm, (0.01, 0.0, 0.35))})
+        (finding,) = layout.validate(samples=0, workspaces=False).findings
+        assert "0.070 m farther apart vertically (0.420 m between" in finding.advice
 
 
 class TestSelfCollisions:
@@ -300,9 +153,6 @@ class TestSelfCollisions:
         assert [pair.links for pair in finding.links] == [("base", "lower")]
         assert finding.amount == pytest.approx(0.1, abs=0.01)
         assert "arm touches itself at the keyframes: arm.base with arm.lower" in finding.what
-
-    def test_stretched_out_they_are_none(self, tmp_path):
-        assert self.fold(tmp_path, 0.0).ok
 
     def test_noise_alone_can_cause_them(self, tmp_path):
         still = self.fold(tmp_path, 2.7)
@@ -375,9 +225,6 @@ class TestTable:
         assert {c.between for c in report.clearances if c.table} == {("a", "table"), ("b", "table")}
         sunk = Layout({"a": replace(layout["a"], position=(0.1, 0, -0.3))}, layout.frames)
         assert kinds(sunk.validate(workspaces=False)) == ["table"]
-
-    def test_beside_it_there_is_none(self):
-        assert self.validate(position=(2.0, 0.0, -0.2)).ok
 
     @pytest.mark.parametrize("table", [(1, 0, 0, 1), (0, 0, 1, math.nan)])
     def test_one_that_is_no_rectangle_is_refused(self, table):
@@ -475,11 +322,6 @@ class TestWorkspaces:
         assert 0 < far.shared[0].shares[0] < near.shared[0].shares[0] < 1
         assert "left and right share" in str(near)
 
-    def test_robots_out_of_reach_share_nothing(self):
-        report = side_by_side(PANDAS, spacing=3.0).validate(samples=0)
-        assert not report.shared
-        assert set(report.workspaces) == {"left", "right"}
-
     def test_one_too_large_to_sample_is_left_out(self):
         report = Layout({"arm": Placement("floating_panda_gripper")}).validate(samples=0)
         assert report.workspaces == {}
@@ -518,16 +360,6 @@ class TestDraws:
         with pytest.raises(LayoutError, match="samples is .* it must be an integer of 0 or more"):
             side_by_side(PANDAS, spacing=0.3).validate(samples=samples)
 
-    def test_a_long_check_tells_how_far_it_is(self, monkeypatch, capsys):
-        monkeypatch.setattr("robot_layouts.core.progress.PATIENCE", 0.0)
-        side_by_side(PANDAS, spacing=0.3).validate()
-        assert "checking the layout: left with right\n" in capsys.readouterr().err
-
-    def test_a_short_one_does_not(self, capsys):
-        pair("panda_stick", 0.6).validate(workspaces=False, samples=0)
-        pair("panda_stick", 0.6).validate(workspaces=False, samples=0)
-        assert capsys.readouterr().err == ""
-
 
 class TestPicture:
     def picture(self, spacing, path, **more):
@@ -555,14 +387,6 @@ class TestPicture:
         written = [text.get_text().strip() for text in plan.texts]
         assert {"left", "right", "cube", "4.1 cm"} <= set(written)
         assert plan.get_title(loc="right") == "ok"
-
-    def test_no_word_covers_another_where_four_hands_meet(self):
-        from layouts.validation.report import draw
-
-        layout = around_table({name: "panda" for name in "abcd"})
-        figure = draw(layout.validate(workspaces=False))
-        assert len(figure.axes[0].texts) >= 4 + 3
-        assert overlapping(figure.axes[0].texts) == []
 
 
 def test_without_fcl_the_error_names_the_extra(monkeypatch):

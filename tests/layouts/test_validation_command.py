@@ -36,14 +36,6 @@ def test_targets_have_names_or_numbers(capsys):
     assert "target 3 (-0.2, 0, 0.1): arm reaches it" in out
 
 
-def test_a_picture_is_saved_and_named(tmp_path, capsys):
-    path = tmp_path / "cell.png"
-    status, out, _ = run(f"single arm=panda --picture {path}", capsys)
-    assert status == 0
-    assert out.endswith(f"picture: {path}\n")
-    assert path.read_bytes().startswith(b"\x89PNG")
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -2,21 +2,9 @@
 
 import pytest
 
-from layouts import (
-    Layout,
-    Placement,
-)
-from robots import (
-    AssetError,
-    DescriptorError,
-)
-from tests.layouts.small_robots import (
-    joint,
-    link,
-    robot,
-    turntable,
-    urdf,
-)
+from layouts import Layout, Placement
+from robots import AssetError, DescriptorError
+from tests.layouts.small_robots import joint, link, robot, turntable, urdf
 from tests.layouts.test_validation import TURN, kinds, pair
 
 

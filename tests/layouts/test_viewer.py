@@ -13,11 +13,10 @@ from benchmarks.teleop import served
 from layouts import side_by_side, single
 from layouts.__main__ import main
 from layouts.viewer import ShownCell, ShownMotion, Thing, ViewerError
-from layouts.viewer.cell import LinkContact
 from layouts.viewer.page import NO_SLIDERS, CellPage, contacts_text, save_html
 from layouts.viewer.server import serving
-from layouts.visuals import MOST_TRIANGLES, coloured, read_visuals, simplified
-from robots import LayoutError, MissingPackageError, RobotRegistry
+from layouts.visuals import MOST_TRIANGLES, coloured, simplified
+from robots import LayoutError, MissingPackageError
 from tests.layouts.cells import link_poses, mixed_cell, random_positions
 
 ARM = ("single", "arm=so100")
@@ -159,12 +158,6 @@ def test_overlaps_are_named_and_marked():
     }
 
 
-def test_many_overlaps_are_counted():
-    many = [LinkContact(("a", "b"), (f"link{i}", "tip"), 0.01) for i in range(9)]
-    assert contacts_text(many).splitlines()[-1] == "- and 3 more"
-    assert contacts_text([]) == "No robot touches another or itself."
-
-
 def test_the_timeline_moves_robots_and_things():
     cell = make_cell(moments=5)
     with serving("127.0.0.1", 0, "arm") as (server, _):
@@ -209,15 +202,6 @@ def test_a_saved_page_is_whole_or_not_there(tmp_path):
     with pytest.raises(ViewerError, match="must end in .html"):
         save_html(cell, tmp_path / "arm.txt")
     assert [p.name for p in tmp_path.iterdir()] == ["deep"]
-
-
-def test_visuals_have_the_colours_of_their_files():
-    so100 = read_visuals(RobotRegistry.load("so100").urdf.locate(pictures=True))
-    colours = {part.rgba for parts in so100.values() for part in parts}
-    assert (0.05, 0.05, 0.05, 1.0) in colours
-    panda = read_visuals(RobotRegistry.load("panda").urdf.locate(pictures=True))
-    assert len({part.rgba for parts in panda.values() for part in parts}) > 1
-    assert len(panda["panda_hand"]) == 2
 
 
 def test_no_mesh_is_drawn_of_more_triangles_than_other_programs_read():

@@ -7,10 +7,6 @@ import viser
 
 from benchmarks.teleop import PATIENCE, SOFTWARE_WEBGL, running_browser, served
 from layouts.__main__ import main
-from layouts.viewer.cell import printable
-from layouts.viewer.page import save_html
-from tests.layouts.guests import site, small_cell
-from tests.layouts.hostile_names import HOSTILE_NAMES
 from tests.layouts.hostile_site import ATTACK, NOTHING, hostile_site
 from tests.pages import browser_page, changed, coloured, settled
 
@@ -93,10 +89,7 @@ def test_a_saved_page_shows_the_robots_and_asks_for_nothing(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "names",
-    [("127.0.0.1",), ("127.0.0.1", "localhost", EVIL)],
-)
+@pytest.mark.parametrize("names", [("127.0.0.1",), ("127.0.0.1", "localhost", EVIL)])
 def test_only_the_page_with_the_token_steers(names):
     rebound = f"--host-resolver-rules=MAP {EVIL} 127.0.0.1"
     with (
@@ -143,27 +136,3 @@ def test_only_the_page_with_the_token_steers(names):
 
 def slider_values(page):
     return page.evaluate(VALUES)
-
-
-@pytest.mark.long
-def test_names_are_no_markup(tmp_path):
-    link, tip, joint = HOSTILE_NAMES[:3]
-    cell = small_cell(tmp_path, HOSTILE_NAMES[6], upper=link, lower=tip, elbow=joint)
-    cell.notes += map(printable, HOSTILE_NAMES)
-    saved = save_html(cell, tmp_path / "cell.html").as_uri()
-    with site(cell) as running, browser_page() as (page, asked):
-        dialogs = []
-        page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
-        for address in (running.address, saved):
-            page.goto(address)
-            page.get_by_text("arm.base in arm.").first.wait_for()
-            text = page.inner_text("body")
-            assert address == saved or f"{joint} (rad)" in text
-            assert f"arm.base in arm.{tip}, " in text
-            for name in map(printable, HOSTILE_NAMES):
-                assert name in text
-            assert page.locator("iframe, img[src*='127.0.0.1:9'], a[href*=evil]").count() == 0
-        assert page.title() == HOSTILE_NAMES[6]
-        assert not dialogs
-        ours = f":{running.port}/"
-        assert [a for a in asked if ours not in a and a != saved and "blob:" not in a] == []

@@ -7,7 +7,6 @@ import urllib.request
 from types import SimpleNamespace
 from urllib.parse import urlsplit
 
-import msgspec
 import pytest
 
 from layouts.viewer import ViewerError
@@ -108,16 +107,6 @@ def test_the_printed_address_opens_wherever_the_server_listens(host, tmp_path):
         assert named == ("[::1]" if ":" in host else "localhost")
 
 
-def test_headers_given_twice_are_refused(open_site):
-    port, path = open_site.port, f"/?token={open_site.token}"
-    own, evil = ("Host", f"127.0.0.1:{port}"), ("Host", f"{EVIL}:{port}")
-    for pairs in ([own, evil], [evil, own], [own, own], [own, ("Origin", f"http://{EVIL}")]):
-        assert ask(port, [*pairs, *WEBSOCKET.items()], path)[0] == 403
-    assert ask(port, [own], f"{path}&token=x")[0] == 403
-    origins = [("Origin", f"http://127.0.0.1:{port}"), ("Origin", f"http://{EVIL}")]
-    assert ask(port, [own, *origins, *WEBSOCKET.items()], path)[0] == 403
-
-
 def test_a_guest_steers_and_others_see_it(open_site):
     page = open_site.page
     with Guest(open_site.address) as steers, Guest(open_site.address) as sees:
@@ -131,26 +120,20 @@ def test_a_guest_steers_and_others_see_it(open_site):
 
 
 def wrong_messages(slider, box):
+    """Of each kind some; `make faults` sends more."""
     update = {"type": "GuiUpdateMessage", "uuid": slider}
-    for value in (float("nan"), float("inf"), -1e300, 1 << 60, "0.5", None, True, [0.5], {}, b"0"):
+    for value in (float("nan"), -1e300, "0.5", None, True, [0.5]):
         yield {**update, "updates": {"value": value}}
-    yield {**update, "updates": {"value": 0.5, "update_cb": []}}
-    for name in ("update_cb", "sync_cb", "gui_api", "removed", "min", "uuid", "__class__"):
-        yield {**update, "updates": {name: 0.5}}
-    for updates in (None, [], "value", 5):
+    for updates in ({"value": 0.5, "update_cb": []}, {"gui_api": 0.5}, None, []):
         yield {**update, "updates": updates}
     yield {"type": "GuiUpdateMessage", "uuid": box, "updates": {"value": 1}}
-    yield {"type": "GuiUpdateMessage", "uuid": [slider], "updates": {"value": 0.5}}
     yield {"type": "GuiUpdateMessage", "uuid": "no such", "updates": {"value": 0.5}}
-    yield {**update, "updates": {"value": 0.5}, "excluded_self_client": 0}
-    yield {"type": "ViewerCameraMessage"}
-    for kind in ("ShareUrlRequest", "ShareUrlDisconnect", "Message", "", None, 5, [], {}):
+    for kind in ("ShareUrlRequest", "ShareUrlDisconnect", "ViewerCameraMessage", None, []):
         yield {"type": kind}
     yield {"type": "RunJavascriptMessage", "source": "alert(1)"}
-    yield {"type": "SetGuiPanelLabelMessage", "label": "owned"}
     start = {"source_component_uuid": slider, "transfer_uuid": "t", "filename": "../x"}
     yield {"type": "FileTransferStartUpload", "mime_type": "x", "part_count": 1, **start}
-    yield from (b"", b"\xc1", b"\x81", b"\x91" * 9000, b"\x81\xa4type\xa1\xff", b"\xff" * 99)
+    yield from (b"", b"\xc1", b"\x91" * 9000, b"\x81\xa4type\xa1\xff")
 
 
 def test_nothing_but_what_the_controls_send_reaches_viser(open_site, monkeypatch):
@@ -184,12 +167,8 @@ def test_nothing_but_what_the_controls_send_reaches_viser(open_site, monkeypatch
         ("127.0.0.1", "127.0.0.1", "127.0.0.1:8080", True),
         ("127.0.0.1", "127.0.0.1", "localhost:8080", True),
         ("127.0.0.1", "127.0.0.1", "LocalHost:8080", True),
-        ("127.0.0.1", "127.0.0.1", "127.0.0.1", False),
         ("127.0.0.1", "127.0.0.1", "127.0.0.1:80", False),
-        ("127.0.0.1", "127.0.0.1", "127.0.0.2:8080", False),
         ("127.0.0.1", "127.0.0.1", "localhost.evil.example:8080", False),
-        ("127.0.0.1", "127.0.0.1", "localhost:8080.evil.example", False),
-        ("127.0.0.1", "127.0.0.1", "evil@localhost:8080", False),
         ("127.0.0.1", "127.0.0.1", ":8080", False),
         ("127.0.0.1", "127.0.0.1", "OWN:8080", False),
         ("::1", "::1", "[::1]:8080", True),
@@ -256,28 +235,6 @@ def test_names_make_nodes_of_their_own():
     assert as_html("one\ntwo") == "one<br>two"
 
 
-def test_a_link_with_a_slash_hangs_on_no_other_link(tmp_path):
-    cell = small_cell(tmp_path, upper="upper", lower="upper/lower")
-    with site(cell) as running:
-        nodes = running.server.scene._handle_from_node_name
-        assert "/arm/collision/upper" in nodes
-        assert "/arm/collision/upper%2Flower" in nodes
-        assert "/arm/collision/upper/lower" not in nodes
-
-
-@pytest.mark.parametrize("name", ["floor", "things", "tables", "WorldAxes", "arm"])
-def test_a_robot_of_any_name_replaces_nothing_of_the_scene(name, tmp_path):
-    from layouts import single
-    from layouts.viewer import ShownCell
-    from tests.layouts.guests import named_robot
-
-    with site(ShownCell("cell", single({name: named_robot(tmp_path)}))) as running:
-        nodes = running.server.scene._handle_from_node_name
-        assert type(nodes["/(floor)"]).__name__ == "GridHandle"
-        assert nodes[f"/{name}"].visible
-        assert f"/{name}/collision/upper" in nodes
-
-
 def test_all_text_of_a_page_is_plain(tmp_path):
     link, tip, joint = HOSTILE_NAMES[:3]
     cell = small_cell(tmp_path, HOSTILE_NAMES[1], upper=link, lower=tip, elbow=joint)
@@ -308,30 +265,3 @@ def test_a_saved_page_says_that_it_has_no_sliders_and_shows_names_as_they_are(tm
         assert f".{name}" not in text
     assert text.count("<iframe") == 0
     assert f"arm.base in arm.{html.escape(tip)}, " in text
-
-
-@pytest.mark.parametrize("where", ["folder.html", "file/cell.html", "nul\0.html", "x" * 300])
-def test_a_page_that_cannot_be_written_is_refused(where, tmp_path):
-    (tmp_path / "folder.html").mkdir()
-    (tmp_path / "file").write_text("")
-    name = where if where.endswith(".html") else f"{where}.html"
-    with pytest.raises(ViewerError, match="^cannot write "):
-        save_html(small_cell(tmp_path), tmp_path / name)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "folder.html", "small.urdf"]
-
-
-def test_controls_are_told_apart_by_what_they_take(open_site):
-    from layouts.viewer.guard import fits
-
-    handles = open_site.server.gui._gui_input_handle_from_uuid
-    takes = {}
-    for uuid, handle in handles.items():
-        for value in (0.5, True, "1 ×", 5, "no"):
-            message = {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}
-            if fits(open_site.server, msgspec.msgpack.encode(message)):
-                takes.setdefault(type(handle).__name__, set()).add((type(value), value))
-    assert takes == {
-        "GuiSliderHandle": {(float, 0.5)},
-        "GuiCheckboxHandle": {(bool, True)},
-        "GuiButtonHandle": {(bool, True)},
-    }

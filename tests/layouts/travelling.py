@@ -87,7 +87,7 @@ def _cells() -> dict[str, Layout]:
             {"arm": Placement(own, on="wall"), "other": Placement(own, (1.0, 0.0, 0.0))},
             {"wall": wall((1.3, 0.0, 0.6), yaw=0.7)},
         ),
-        "grafted": hung_robot(grafted),
+        "grafted": hung(grafted),
     }
     found.update({f"hung_{name}": hung(name) for name in robots})
     draw = random.Random(0)
@@ -96,14 +96,6 @@ def _cells() -> dict[str, Layout]:
         places = {f"p{i}": Placement(name, *_stand(i, draw)) for i, name in enumerate(chosen)}
         found[f"mix_{number}"] = Layout(places, {"ceiling": ceiling(2.0)})
     return found
-
-
-def hung_robot(robot: RobotDescriptor) -> Layout:
-    """Return one robot upside down under a ceiling, turned."""
-    return Layout(
-        {"arm": Placement(robot, (0.1, -0.2, 0.0), on="ceiling", rpy=(0.0, 0.0, 1.0))},
-        {"ceiling": ceiling(1.5, position=(0.4, -0.3))},
-    )
 
 
 def _stand(number: int, draw: random.Random) -> tuple[tuple[float, ...], tuple[float, ...]]:

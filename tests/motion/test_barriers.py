@@ -6,14 +6,10 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement
-from robot_layouts.core.progress import Progress
 from robot_layouts.motion import NoPlanError, plan
 from robot_layouts.motion.collision.cell import Cell, Clearances
 from robot_layouts.motion.model.obstacles import Track, box
-from robot_layouts.motion.planning.goals import PlaceGoal
 from robot_layouts.motion.planning.infeasibility import InfeasibilityProofs
-from robot_layouts.motion.planning.query import Query
-from robot_layouts.motion.timing.trajectories import CellTrajectory
 
 PAN, LIFT = range(2)
 TABLE = (-2.0, -2.0, 2.0, 2.0)
@@ -92,29 +88,3 @@ def test_what_moves_away_is_no_barrier():
     lift = box("lift", (4.0, 4.0, 0.9)).moved(Track(np.array([0.0, 2.0]), poses))
     assert proof(Cell(raised(), [lift])) is None
     assert proof(Cell(raised(), [box("floor", (4.0, 4.0, 0.9), (0.0, 0.0, -0.45))])) is not None
-
-
-def test_postures_that_are_cut_off_are_left_out():
-    cell = Cell(raised(), table=TABLE)
-    near = cell.start.copy()
-    near[PAN] = 1.0
-    cut_off, reachable = behind(cell)[None, :6], near[None, :6]
-    ends = asked(cell, cut_off, reachable).reachable_ends()
-    assert np.array_equal(ends[:, :6], reachable)
-    with pytest.raises(NoPlanError, match="shoulder_lift_joint would have to pass"):
-        asked(cell, cut_off, cut_off).reachable_ends()
-
-
-def asked(cell, candidates, others):
-    target = PlaceGoal("arm", "arm", np.arange(6), candidates, "", lambda: others)
-    return Query(
-        cell,
-        cell.start,
-        (target,),
-        CellTrajectory(cell, cell.start),
-        Clearances(cell, ["arm"], 0.01),
-        np.ones(cell.size),
-        0.01,
-        0,
-        Progress(),
-    )

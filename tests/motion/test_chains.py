@@ -7,7 +7,6 @@ from layouts import Layout, Placement
 from robot_layouts.motion.collision.cell import Cell
 from robot_layouts.motion.model.link_poses import LinkPoses
 from tests.catalogue import every_robot
-from tests.layouts.cells import mixed_cell
 from tests.motion import cells
 
 
@@ -31,19 +30,3 @@ def test_parts_of_every_robot_are_where_its_tree_has_them(robot):
     found = differences(cell, LinkPoses(cell, range(len(cell.parts))), qpos)
     assert len(found) == len(cell.parts) - 1
     assert max(found.values(), default=0.0) < 1e-12
-
-
-def test_parts_of_several_robots_are_there_at_once():
-    cell = Cell(mixed_cell())
-    qpos, _ = cells.states(cell, 5)
-    assert max(differences(cell, LinkPoses(cell, range(len(cell.parts))), qpos).values()) < 1e-12
-
-
-def test_only_what_is_asked_for_and_what_carries_it_is_computed():
-    cell = Cell(mixed_cell())
-    qpos, _ = cells.states(cell, 3)
-    wanted = next(i for i, part in enumerate(cell.parts) if part.robot == "up" and part.parent > 0)
-    link_poses = LinkPoses(cell, [wanted])
-    assert list(link_poses.rows) == [0, cell.parts[wanted].parent, wanted]
-    assert max(differences(cell, link_poses, qpos).values()) < 1e-12
-    assert LinkPoses(cell, []).places(qpos).shape == (1, 3, 4, 4)

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from layouts import Layout, Placement, face_to_face
 from layouts.validation.collisions import FAR
 from robot_layouts.motion.collision.cell import Cell
-from robot_layouts.motion.collision.checker import Checker
 from robot_layouts.motion.collision.travel import TravelBounds
 from robot_layouts.motion.model.bodies import WORLD
 from robot_layouts.motion.model.obstacles import Track, box
@@ -61,19 +60,6 @@ def test_distance_is_the_least_that_fcl_finds(cell):
     np.testing.assert_allclose(np.maximum(distance, 0.0), least, atol=1e-6)
     for state, time, known in zip(qpos[:4], times[:4], distance[:4], strict=True):
         assert checker.nearest(state, time).distance == pytest.approx(known, abs=1e-6)
-
-
-def test_states_that_are_free_and_states_that_are_not_are_both_among_those_compared(crowd):
-    qpos, times = cells.states(crowd, 64)
-    free = crowd.checker().free(qpos, times)
-    assert 0.1 < free.mean() < 0.9
-
-
-def test_a_batch_answers_like_its_states_one_by_one(crowd):
-    checker = crowd.checker(clearance=0.01)
-    qpos, times = cells.states(crowd, 300)
-    alone = [checker.free(q[None], t)[0] for q, t in zip(qpos[:40], times[:40], strict=True)]
-    assert checker.free(qpos, times)[:40].tolist() == alone
 
 
 # -- who and how near ------------------------------------------------------------------------
@@ -130,13 +116,6 @@ def test_nothing_within_reach_is_far():
     assert checker.contact(cell.start) is None
 
 
-def test_without_pairs_everything_is_free(crowd):
-    none = Checker(crowd, np.zeros((0, 2), np.intp), 0.0)
-    assert none.free(np.tile(crowd.start, (3, 1))).tolist() == [True] * 3
-    assert none.distance(crowd.start[None]).tolist() == [FAR]
-    assert none.free(np.zeros((0, crowd.size))).tolist() == []
-
-
 # -- which pairs count -----------------------------------------------------------------------
 
 
@@ -149,12 +128,6 @@ def test_only_pairs_of_those_that_move_are_looked_at(crowd):
     assert names == {frozenset(("small", other)) for other in others}
     parts = {frozenset(p) for p in np.array([s.part for s in crowd.solids])[checker.pairs].tolist()}
     assert all(len(pair) == 2 for pair in parts)  # what is rigid with each other never counts
-
-
-def test_a_base_stands_on_its_table(crowd):
-    at_table = [pair for pair in crowd.counted_pairs if crowd.solids[pair[1]].owner == "table"]
-    assert at_table
-    assert all(crowd.solids[a].part != WORLD for a, _ in at_table)
 
 
 def test_what_is_held_may_touch_its_hand_and_nothing_else(crowd):
@@ -182,15 +155,6 @@ def test_what_is_held_collides_where_its_arm_takes_it():
     assert held.checker().contact(bare.start).names == ("stone", "rod")
     assert held.checker(except_=[("rod", "stone")]).free(bare.start[None])[0]
     assert not held.checker(except_=[("rod", "arm_0/panda_hand")]).free(bare.start[None])[0]
-
-
-def test_a_body_is_grasped_where_it_is(crowd):
-    held = crowd.held[0]
-    poses = cells.solid_poses(crowd, crowd.start[None], np.zeros(1))[0]
-    at = next(i for i, solid in enumerate(crowd.solids) if solid.owner == "stick")
-    hand = crowd.poses(crowd.start[None])[0, crowd.links.index(("left", "panda_hand_tcp"))]
-    np.testing.assert_allclose(poses[at], hand, atol=1e-12)
-    np.testing.assert_allclose(held.obstacle.pose, np.eye(4), atol=1e-12)
 
 
 def test_what_moves_is_where_its_time_says():
@@ -272,15 +236,6 @@ def test_what_slides_out_travels_farther_when_it_is_turned(tmp_path):
         ends = np.array([[0.0, out], [1.0, out]])
         assert least <= TravelBounds(cell).steps(*ends, (0.001, 10.0)) / 1000 <= least + 0.1
         assert least <= TravelBounds(cell).between(*ends)[WORLD].max() <= least + 0.1
-
-
-def test_what_moves_both_of_two_links_brings_them_no_nearer(crowd):
-    turned = crowd.start.copy()
-    turned[crowd.slices["left"].start] += 0.5
-    between = TravelBounds(crowd).between(crowd.start, turned)
-    own = [i for i, part in enumerate(crowd.parts) if part.robot == "left"]
-    assert (between[np.ix_(own, own)] == 0.0).all()
-    assert (between[own[0], WORLD], between[WORLD, own[-1]]) > (0.0, 0.3)
 
 
 def test_nothing_in_the_way_is_missed(tmp_path):

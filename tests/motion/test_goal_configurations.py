@@ -1,16 +1,13 @@
 """Goals that take a longer search: postures that are not met with at first."""
 
-from itertools import product
-
 import numpy as np
-import pytest
 
 from layouts import single
-from robot_layouts.motion import NoPlanError, TcpGoal, plan
+from robot_layouts.motion import TcpGoal, plan
 from robot_layouts.motion.collision.cell import Cell, Clearances
 from robot_layouts.motion.model.obstacles import box
 from robot_layouts.motion.planning.goals import PlaceGoal, read_targets
-from robot_layouts.motion.planning.query import choices, find_goal_configurations
+from robot_layouts.motion.planning.query import find_goal_configurations
 from tests.motion.two_pandas import aside, cell, in_the_middle
 
 HARD = TcpGoal((-0.465, -0.112, 0.763), (0.46803, 0.79404, 0.09321, 0.37802))
@@ -45,13 +42,6 @@ def test_postures_of_a_longer_search_let_goals_agree():
     assert any(np.array_equal(end[left.moving], posture) for posture in left.candidates)
 
 
-def test_goals_that_exclude_each_other_are_named():
-    whole = Cell(cell())
-    left, right, start = meeting(whole, others=np.empty((0, 7)))
-    with pytest.raises(NoPlanError, match="goals of left and right exclude each other"):
-        find_goal_configurations([left, right], Clearances(whole, whole.robots, 0.01), start, 0.0)
-
-
 def test_an_obstacle_is_avoided_by_a_posture_of_a_longer_search():
     block = box("block", (0.3, 0.3, 0.3), (0.0, 0.0, 0.3))
     whole = Cell(cell(), [block])
@@ -59,9 +49,3 @@ def test_an_obstacle_is_avoided_by_a_posture_of_a_longer_search():
     _, right, start = meeting(whole, others=elsewhere)
     (end,) = find_goal_configurations([right], Clearances(whole, ["right"], 0.01), start, 0.0)
     assert np.array_equal(end[right.moving], elsewhere[0])
-
-
-def test_choices_come_by_their_sum():
-    counts = [3, 1, 2, 4]
-    known = sorted(product(*map(range, counts)), key=lambda choice: (sum(choice), choice))
-    assert list(choices(counts)) == known

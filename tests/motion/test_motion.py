@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from robot_layouts.motion import Motion, MotionError
-from robot_layouts.motion.model.hermite import hermite, hermite_slopes
 from robots import UnknownNameError
 from tests.motion.two_pandas import cell
 
@@ -123,15 +122,3 @@ def test_motions_that_do_not_meet_at_rest_do_not_follow_each_other():
         waves().then(waves())
     with pytest.raises(MotionError, match="rest is -1"):
         swing(0.0, 1.0).then(swing(1.0, 0.0), rest=-1)
-
-
-def test_slopes_are_the_derivatives_of_the_curve():
-    random = np.random.default_rng(0)
-    knots, values, slopes = np.array([0.0, 0.4, 1.0]), *random.normal(size=(2, 3, 2))
-    times, step = np.array([0.1, 0.3, 0.5, 0.9]), 1e-5
-
-    def at(t):
-        return hermite(knots, values, slopes, t)
-
-    numeric = (at(times + step) - at(times - step)) / (2 * step)
-    assert np.allclose(hermite_slopes(knots, values, slopes, times), numeric, atol=1e-8)

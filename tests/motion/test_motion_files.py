@@ -66,14 +66,8 @@ def test_a_motion_comes_back_as_it_was(file):
         ({"joints": {}}, "its robot 'left' has the joints None; a panda has panda_joint1"),
         ({"obstacles": {}}, "obstacles is .* it must be a list"),
         ({"obstacles": [{"name": 3, "shapes": []}]}, "obstacles.0..name is 3; it must be a text"),
-        (
-            {"obstacles": [{"name": "a", "shapes": [[1.0]]}]},
-            "0..0. is 1.0; it must be a list",
-        ),
-        (
-            {"obstacles": [{"name": "a", "shapes": [], "track": {}}]},
-            "it has no .*track.times",
-        ),
+        ({"obstacles": [{"name": "a", "shapes": [[1.0]]}]}, "0..0. is 1.0; it must be a list"),
+        ({"obstacles": [{"name": "a", "shapes": [], "track": {}}]}, "it has no .*track.times"),
         ({"obstacles": [{**CUBE, "shapes": [[[0.0, 0.0, 1e30]]]}]}, "finite numbers, 1e.06 m at"),
         ({"obstacles": [{**CUBE, "pose": FAR_AWAY}]}, "finite numbers, 1e.06 at most"),
         ({"held": [{"place": "left"}]}, "it has no held.0..obstacle"),

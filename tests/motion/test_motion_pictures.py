@@ -9,7 +9,7 @@ from PIL import Image
 from layouts import face_to_face
 from layouts.preview import COLOURS
 from robot_layouts.motion import MotionError
-from robot_layouts.motion.output.pictures import MOST_MARKS, _marks, save_picture
+from robot_layouts.motion.output.pictures import save_picture
 from robot_layouts.motion.output.scenes import Scenes
 from tests.experts.free_motions import swing
 
@@ -69,11 +69,3 @@ def test_what_is_drawn_is_what_the_certificate_says():
     ways = scenes.tcp_ways(np.array([0.0, motion.duration]))
     assert set(ways) == {"left", "right"}
     assert np.linalg.norm(np.diff(ways["left"], axis=0)) > 0.05
-
-
-@pytest.mark.parametrize("duration", [0.05, 0.61, 1.0, 7.02, 59.0, 1000.0])
-def test_marks_are_few_round_times(duration):
-    marks = _marks(duration)
-    assert 3 <= len(marks) <= MOST_MARKS
-    assert marks[-1] <= duration
-    assert np.diff([0.0, *marks]) == pytest.approx(marks[0])

@@ -102,13 +102,6 @@ def test_what_is_no_obstacle_is_refused_in_words(make, words):
         make()
 
 
-def test_a_body_that_is_moved_keeps_what_is_known_of_its_shapes():
-    crate = box("crate", (0.1, 0.2, 0.3))
-    elsewhere = crate.moved(pose_matrix((1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
-    assert elsewhere.hulls is crate.hulls
-    assert elsewhere.poses(None, 1)[0][0, 3] == 1.0
-
-
 def test_poses_of_single_precision_are_taken():
     """SAPIEN's quaternions of bodies that tumble are 1 to a few units of their last place."""
     crate = box("crate", (0.1, 0.2, 0.3))

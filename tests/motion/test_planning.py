@@ -1,12 +1,11 @@
 """Plans: goals of all kinds, what stands in the way, who waits for whom, and why there is none."""
 
-from dataclasses import replace
 from hashlib import sha256
 
 import numpy as np
 import pytest
 
-from layouts import Placement, single
+from layouts import Placement
 from layouts.layout import Layout
 from robot_layouts.motion import MotionError, NoPlanError, RegionGoal, TcpGoal, plan
 from robot_layouts.motion.collision.cell import Cell
@@ -14,13 +13,7 @@ from robot_layouts.motion.model.obstacles import Track, box
 from robots import UnknownNameError
 from robots.urdf.tcp import find_tcp
 from tests.fresh_process import in_fresh_process
-from tests.motion.two_pandas import (
-    DOWN,
-    aside,
-    cell,
-    in_the_middle,
-    turned,
-)
+from tests.motion.two_pandas import DOWN, aside, cell, in_the_middle, turned
 
 
 def a_post():
@@ -64,14 +57,6 @@ def test_a_wider_berth_is_given_where_it_is_asked_for():
     near = motion.certify().clearance
     assert near is not None
     assert near.distance > 0.08 - 0.01
-
-
-def test_without_the_post_the_way_is_straight_and_goes_through_it():
-    goals = {"left": TcpGoal((0.0, -0.1, 0.3), DOWN)}
-    through = plan(cell(), {"left": turned("left", -1.4)}, goals)
-    certificate = replace(through, obstacles=(a_post(),)).certify()
-    assert not certificate.ok
-    assert any("post" in contact.names for contact in certificate.collisions)
 
 
 def test_a_region_is_reached_somewhere():
@@ -161,11 +146,7 @@ def test_who_is_there_already_stays():
     [
         ({"left": TcpGoal((0, 3, 0.3))}, "unreachable", r"stays 2\.\d+ m away"),
         ({"left": [9.0, 0, 0, -1, 0, 1, 0]}, "unreachable", "panda_joint1 at 9, beyond its limits"),
-        (
-            {"left": TcpGoal((0.0, 0.6, 0.3), DOWN)},
-            "unreachable",
-            "does not get to its goal",
-        ),
+        ({"left": TcpGoal((0.0, 0.6, 0.3), DOWN)}, "unreachable", "does not get to its goal"),
         (
             {"left": in_the_middle(), "right": in_the_middle()},
             "goal in collision",
@@ -270,10 +251,3 @@ def loaded_by_motion() -> list[str]:
     from robot_layouts import motion  # noqa: F401
 
     return [name for name in ("ompl", "toppra", "fcl", "sapien", "torch") if name in sys.modules]
-
-
-def test_one_robot_alone_can_be_planned_for():
-    layout = single({"arm": "panda"})
-    motion = plan(layout, goals={"arm": TcpGoal((0.0, 0.2, 0.3), DOWN)}, table=(-1, -1, 1, 1))
-    assert motion.table == (-1, -1, 1, 1)
-    assert motion.certify().ok

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robot_layouts.motion.collision.spheres import BALLS, clusters_of
+from robot_layouts.motion.collision.spheres import clusters_of
 from robots import RobotRegistry
 from robots.bodies.hulls import Hull, load_model
 from tests.catalogue import every_robot
@@ -39,20 +39,3 @@ def test_balls_are_tight():
             assert cluster.radii.max() <= cluster.radius + 1e-9
             if cluster.radius > 0.08:
                 assert cluster.radii.mean() < 0.8 * cluster.radius
-
-
-def test_many_hulls_of_one_link_come_in_several_clusters():
-    grid = [(x, y, z) for x in range(3) for y in range(3) for z in range(3)]
-    cube = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * 0.01
-    clusters = clusters_of(tuple(Hull(0, cube + np.array(at) * 0.02, None) for at in grid))
-    assert len(clusters) == 4
-    assert all(len(cluster.radii) == BALLS for cluster in clusters)
-    assert set(np.concatenate([cluster.hulls for cluster in clusters]).tolist()) == set(range(27))
-
-
-def test_balls_are_the_same_every_time():
-    hulls = links_of("panda")[3]
-    again = tuple(Hull(0, hull.corners.copy(), None) for hull in hulls)
-    for one, other in zip(clusters_of(hulls), clusters_of(again), strict=True):
-        assert one.radii.tobytes() == other.radii.tobytes()
-        assert one.middles.tobytes() == other.middles.tobytes()

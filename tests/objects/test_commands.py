@@ -6,7 +6,7 @@ import pytest
 
 from objects import ObjectRegistry
 from objects.inspect import report
-from objects.picture import PIXELS, draw, rasterized, save_sheet
+from objects.picture import draw, save_sheet
 from objects.registry import CATALOGUE
 from robot_layouts.__main__ import main
 from robots import DescriptorError
@@ -47,22 +47,6 @@ def test_a_picture_shows_every_thing_that_was_named(tmp_path, capsys):
     for half in (left, right):
         assert 0.05 < (half.min(axis=-1) < 0.9).mean() < 0.8
     assert len(draw([ObjectRegistry.load(name) for name in CATALOGUE]).axes) == len(CATALOGUE)
-
-
-def test_grasps_are_drawn_if_asked_for(tmp_path):
-    mug = [ObjectRegistry.load("mug")]
-    plain, marked = (draw(mug, grasps=grasps) for grasps in (False, True))
-    assert len(plain.axes[0].lines) == 0
-    assert len(marked.axes[0].lines) == len(mug[0].grasps)
-
-
-def test_the_nearest_triangle_is_seen():
-    corners = np.array([(-1, -1, 0), (3, -1, 0), (-1, 3, 0), (-1, -1, 1), (1, -1, 1), (-1, 1, 1.0)])
-    triangles, paints = np.array([[3, 4, 5], [0, 1, 2], [0, 2, 1]]), np.eye(3)
-    picture = rasterized(corners, triangles, paints, np.zeros(2), 1.0, PIXELS)
-    assert picture[-2, 1] == pytest.approx([1, 0, 0, 1])  # the lower left one is of the near one
-    assert picture[1, -3] == pytest.approx([0, 1, 0, 1])
-    assert picture[..., 2].max() == 0  # the third faces away
 
 
 @pytest.mark.parametrize(

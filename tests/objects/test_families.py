@@ -11,8 +11,8 @@ import pytest
 
 from objects import Made, ObjectDescriptor, ObjectRegistry, Size, family
 from objects.registry import CATALOGUE, OBJECTS
-from objects.shapes import Box, Cylinder
-from objects.solids import bounds, surface
+from objects.shapes import Box
+from objects.solids import surface
 from robot_layouts.kinematics.rotations import rotation_of
 from robots import DescriptorError, UnknownNameError
 from tests.checkout import ROOT
@@ -112,40 +112,6 @@ def _span(surface, position, frame):
     high = min(at[ahead > 1e-12], default=np.inf)
     outside = (away[np.abs(ahead) <= 1e-12] < -1e-12).any()
     return None if outside or low >= high else (low, high)
-
-
-@pytest.mark.parametrize("seed", [None, *SEEDS])
-def test_what_is_made_for_each_other_fits(seed):
-    def load(name):
-        return ObjectRegistry.load(name, seed)
-
-    peg, socket = load("peg"), load("socket")
-    assert peg.sizes == socket.sizes
-    inner = 2 * min(abs(part.position[0]) - part.half_size[0] for part in socket.parts[3:])
-    assert 0.001 < inner - peg.sizes["side"] < 0.005
-    for inside, outside in (("bolt", "nut"), ("shaft", "gear"), ("bottle", "bottle_cap")):
-        one, other = load(inside), load(outside)
-        assert one.sizes == other.sizes
-        (pin,) = [p for p in one.parts if isinstance(p, Cylinder)][-1:]
-        wedges = [part for part in other.parts if _is_wedge(part)]
-        clear = min(np.hypot(*_hole_side(wedge)) for wedge in wedges) - pin.radius
-        assert 0.0003 < clear < 0.003, inside
-    box, lid = load("box"), load("box_lid")
-    assert (np.array(lid.extent)[:2] > np.array(box.extent)[:2]).all()
-    plug, outlet = load("plug"), load("outlet")
-    assert plug.points["tip"].position[2] == outlet.points["holes"].position[2]
-    low, high = bounds(load("pot_two_handles").parts)
-    assert load("pot_lid").sizes["radius"] < high[1] + 1e-6
-
-
-def _is_wedge(part):
-    return type(part).__name__ == "ConvexHull" and len(part.corners) == 8
-
-
-def _hole_side(part):
-    """The point of a wedge's inner side that is nearest to the axis, (2,) (m)."""
-    inner = sorted(part.corners, key=lambda corner: np.hypot(*corner[:2]))[:4]
-    return np.mean(inner, axis=0)[:2]
 
 
 def test_a_length_that_the_family_does_not_have_is_named_with_the_closest():

@@ -29,10 +29,7 @@ HERE = np.array([[1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0]])
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        (
-            {"name": "an elbow"},
-            "joint name 'an elbow' must be a letter followed by",
-        ),
+        ({"name": "an elbow"}, "joint name 'an elbow' must be a letter followed by"),
         ({"kind": "twist"}, "Joint: kind is 'twist'; it must be 'slide' or 'turn'"),
         ({"axis": (0.0, 0.0, 2.0)}, r"joint elbow: axis \(0.0, 0.0, 2.0\) must be of length 1"),
         ({"lower": 4.0}, "joint elbow: lower is 4, upper 3.14159; the lower one must be the small"),

@@ -1,6 +1,5 @@
 """Things from mesh files: what collides, how they rest, where they are held, what is refused."""
 
-import json
 import sys
 from dataclasses import replace
 
@@ -184,15 +183,6 @@ def test_files_that_are_no_meshes_are_refused(tmp_path):
     flat = trimesh.Trimesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [[0, 1, 2]])
     with pytest.raises(DescriptorError, match="flat.stl: the mesh has no volume"):
         ObjectDescriptor.from_mesh(saved(tmp_path, "flat.stl", flat), most_parts=1)
-
-
-def test_what_is_known_better_is_taken_over(tmp_path):
-    thing = ObjectDescriptor.from_mesh(
-        mallet(tmp_path), "hammer_of_mine", licence="CC0-1.0", grasps=(), about="A mallet"
-    )
-    assert (thing.name, thing.licence, thing.about) == ("hammer_of_mine", "CC0-1.0", "A mallet")
-    assert thing.grasps == ()
-    json.dumps(list(thing.rests.values()))
 
 
 def test_it_is_a_body_of_a_task_in_any_size(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull as QhullsHull
 
-from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Sphere, scaled
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Sphere
 from objects.solids import bounds, hull_triangles, lowest, mass_of, reach, sampled, surface
 from robot_layouts.kinematics.quaternions import normalised
 from robots import DescriptorError, SimulationError
@@ -69,11 +69,6 @@ def test_a_surface_reaches_as_far_as_its_shape_and_holds_nearly_its_volume(shape
     assert np.abs(heights.max(axis=1)).max() < 1e-9
 
 
-def test_the_centre_of_a_tetrahedron_is_the_mean_of_its_corners():
-    assert mass_of([ConvexHull(CORNERS)]).centre == pytest.approx([0.25, 0.25, 0.25])
-    assert mass_of([ConvexHull(CORNERS)]).mass == pytest.approx(1000 / 6)
-
-
 def test_bounds_and_the_lowest_point_count_what_collides():
     shapes = (Box((0.1, 0.2, 0.3)), Sphere(9.0, collides=False))
     low, high = bounds(shapes)
@@ -83,15 +78,7 @@ def test_bounds_and_the_lowest_point_count_what_collides():
     assert lowest(shapes, (quarter, quarter, 0.0, 0.0)) == pytest.approx(-0.2)
 
 
-def test_a_scaled_hull_is_larger():
-    hull = ConvexHull(CORNERS, position=(1.0, 0.0, 0.0))
-    assert mass_of([scaled(hull, 2.0)]).volume == pytest.approx(8 * mass_of([hull]).volume)
-    assert scaled(hull, 2.0).position == (2.0, 0.0, 0.0)
-
-
 def test_a_mesh_counts_as_its_convex_hull(tmp_path):
-    import trimesh
-
     trimesh.creation.annulus(0.1, 0.2, 0.3).export(tmp_path / "ring.stl")
     found = mass_of([Mesh(tmp_path / "ring.stl", scale=(2.0, 2.0, 2.0))])
     assert found.volume == pytest.approx(8 * math.pi * 0.2**2 * 0.3, rel=0.02)

@@ -16,7 +16,7 @@ from parity.native import make_native, quiet
 from robots import RobotRegistry
 from tasks.episode import Episode
 from tests.native import NATIVE, Pair, complaints
-from tests.tasks.test_native_cameras import differences
+from tests.tasks.test_native_camera_settings import differences
 
 pytestmark = NATIVE
 

@@ -9,11 +9,12 @@ import tasks
 from layouts import single
 from robot_layouts.simulation import Box, Camera, Simulation, World
 from robot_layouts.simulation.cameras import SHADERS
-from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.sapien3.backdrop import LAYERED
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.studio import Studio
 from tests.quick import quick_cases
+
+pytestmark = pytest.mark.usefixtures("drawn")
 
 CAMERAS = {
     "front": Camera((0.3, 0.0, 0.6), (-0.1, 0.0, 0.1), "front", 61, 47),
@@ -23,13 +24,6 @@ CAMERAS = {
 RED, GREEN, GLASS = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.5)
 HALF = (0.05, 0.05, 0.05)
 PLACE = (-0.1, 0.0, 0.05)
-
-
-@pytest.fixture(autouse=True)
-def drawn(renderer) -> None:
-    """Skip where nothing can be drawn."""
-    if problem := vulkan_problem():
-        pytest.skip(problem)
 
 
 def built(*colors, kinds=("static", "dynamic"), apart: float = 0.2) -> Simulation:
@@ -94,19 +88,6 @@ def test_a_picture_of_parts_is_that_of_the_whole(task_id: str):
                 expect_same(env.simulation)
 
 
-@pytest.mark.long  # draws the cameras of every task
-@pytest.mark.parametrize("task_id", tasks.list_tasks())
-def test_it_is_with_the_cameras_of_every_task(task_id: str):
-    with closing(tasks.make(task_id, obs_mode="rgb")) as env:
-        cameras = env.observer.cameras
-        for seed in range(2):
-            env.reset(seed=seed)
-            env.step(np.ones((1, *env.single_action_space.shape), np.float32))
-            both = [pictures(env.simulation, layered=x, cameras=cameras) for x in (True, False)]
-            for laid, whole in zip(*both, strict=True):
-                np.testing.assert_array_equal(laid, whole)
-
-
 def test_a_hand_s_camera_draws_only_what_is_before_it():
     hand = {"arm": "panda_wristcam"}
     with closing(tasks.make("PickCube-v1", robots=hand, obs_mode="rgb")) as env:
@@ -118,18 +99,6 @@ def test_a_hand_s_camera_draws_only_what_is_before_it():
             hidden = {body.entity.name for body in studio_of(env.simulation)._bodies._hidden}
             assert {"panda_link0", "panda_link1"} <= hidden
             assert not hidden & {"table-workspace", "cube", "panda_leftfinger"}
-
-
-def test_what_no_camera_sees_is_not_drawn():
-    simulation = built(RED, GREEN)
-    away = {"away": CAMERAS["away"]}
-    pictures(simulation, layered=True, cameras=away)
-    bodies = studio_of(simulation)._bodies
-    assert len(bodies._moving) >= 10
-    assert bodies._hidden == {*bodies._moving, *bodies._still}
-    pictures(simulation, layered=True)
-    assert not bodies._hidden & set(bodies._moving)
-    expect_same(simulation)
 
 
 def test_what_stands_still_is_drawn_again_where_it_was_moved():

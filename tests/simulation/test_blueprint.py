@@ -49,18 +49,6 @@ def test_a_shape_that_sapien_leaves_out_is_an_error(urdf):
     assert not blueprint.checked
 
 
-def test_the_shapes_are_counted_once(urdf):
-    blueprint = read_blueprint(descriptor(urdf), visuals=False)
-    for _ in range(2):
-        blueprint.build(sapien.Scene([sapien.physx.PhysxCpuSystem()]), sapien.Pose())
-        assert blueprint.checked
-
-
-def test_a_file_url_is_read(urdf):
-    urdf.write_text(toy(mesh(f"file://{urdf.parent}/arm.stl")))
-    assert shapes(urdf) == [1, 1, 1]
-
-
 @pytest.mark.parametrize("reference", ["/etc/passwd", "../../../../../../etc/passwd"])
 def test_files_of_the_system_are_refused(urdf, reference):
     urdf.write_text(toy(mesh(reference)))

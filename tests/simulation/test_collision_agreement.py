@@ -97,14 +97,6 @@ def test_robots_of_the_catalogue(name):
 
 
 @pytest.mark.native
-@pytest.mark.long
-@pytest.mark.parametrize("file", UNKNOWN)
-def test_guessed_robots(file):
-    path = find_package("mani_skill") / "mani_skill" / "assets" / "robots" / file
-    expect_agreement(RobotDescriptor.from_urdf(path, quiet=True))
-
-
-@pytest.mark.native
 @pytest.mark.parametrize("file", UNKNOWN)
 def test_what_may_overlap_never_collides(file):
     """Whatever the posture, physics reports no contact of a pair that checks leave out."""

@@ -100,9 +100,6 @@ class TestCover:
     def pairs(self, *groups):
         return {frozenset(pair) for group in groups for pair in combinations(group, 2)}
 
-    def test_one_set_for_links_of_which_any_two_may_overlap(self):
-        assert cover(self.pairs("abcdefgh"), set()) == [set("abcdefgh")]
-
     def test_no_pair_comes_in_that_was_not_named(self):
         random = np.random.default_rng(0)
         everything = sorted(map(sorted, self.pairs("abcdefghij")))
@@ -112,10 +109,6 @@ class TestCover:
             given = {pair for pair in pairs if "a" in pair}
             held = self.pairs(*cover(pairs - given, given))
             assert pairs - given <= held <= pairs
-
-    def test_links_that_are_excused_anyhow_join_a_set(self):
-        pairs, given = self.pairs("ac", "bc", "ad"), self.pairs("ab", "cd", "bd")
-        assert cover(pairs, given) == [set("abcd")]
 
 
 def test_links_stand_still_that_the_guess_lets_overlap(tmp_path):
@@ -127,16 +120,6 @@ def test_links_stand_still_that_the_guess_lets_overlap(tmp_path):
     assert after_a_second(BuiltWorld(Layout({"posts": Placement(guessed)}))) < 1e-3
     strict = replace(guessed, allowed_collisions=())
     assert after_a_second(BuiltWorld(Layout({"posts": Placement(strict)}))) > 0.1
-
-
-def test_neighbours_across_a_fixed_joint_stand_still(tmp_path):
-    urdf = tmp_path / "pedestal.urdf"
-    urdf.write_text(stack(0.0, 0.1, 0.2, 0.2, kinds=("fixed",)))
-    guessed = RobotDescriptor.from_urdf(urdf, quiet=True)
-    assert guessed.allowed_collisions == (("l0", "l2"),)
-    layout = Layout({"posts": Placement(guessed)})
-    assert layout.validate(workspaces=False).ok
-    assert after_a_second(BuiltWorld(layout)) < 1e-3
 
 
 def test_any_number_of_pairs(tmp_path):
@@ -174,9 +157,7 @@ def test_links_of_two_robots_collide_whatever_each_allows(tmp_path):
     assert frozenset({"l0", "l2"}) in touching
 
 
-def test_a_robot_that_says_nothing_keeps_the_groups_of_native_s_loader(
-    tmp_path,
-):
+def test_a_robot_that_says_nothing_keeps_the_groups_of_native_s_loader(tmp_path):
     urdf = tmp_path / "toy.urdf"
     urdf.write_text(toy())
     urdf.with_suffix(".srdf").write_text(

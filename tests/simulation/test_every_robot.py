@@ -16,7 +16,6 @@ from robots import RobotRegistry
 from robots.assets.packages import find_package
 from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
-from robots.urdf.summary import parse_urdf
 from tests.catalogue import every_robot
 
 STEPS = 5
@@ -71,15 +70,6 @@ def numbers() -> list[object]:
         for number in RobotRegistry.load(name).describe_action()
         if not number.unit.endswith("/s")  # no position that a joint is driven to
     ]
-
-
-@pytest.mark.parametrize("robot", every_robot())
-def test_every_collision_shape_of_its_urdf_is_there(robot):
-    root = parse_urdf(RobotRegistry.load(robot).urdf.locate().read_bytes(), robot)
-    expected = {str(e.get("name")): len(e.findall("collision")) for e in root.iterfind("link")}
-    links = worlds_below(simulation_of(robot))[0].robots["arm"].links
-    assert {name: len(link.collision_shapes) for name, link in links.items()} == expected
-    assert sum(expected.values()) > 0
 
 
 @pytest.mark.parametrize("robot", every_robot())

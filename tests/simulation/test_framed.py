@@ -90,13 +90,6 @@ def test_a_world_takes_places_and_sizes_as_declared():
     np.testing.assert_allclose(simulation.read().position("box")[0], (0.8, -1.0, 0.05), atol=1e-6)
 
 
-def test_what_varies_in_size_too_stands_on_the_table():
-    more = {"size": {"can": {"uniform": (1.2, 1.2)}}}
-    env = tasks.make("CellPutAway-v1", layout=SMALL, randomization=tasks.Randomization(**more))
-    can, size = env.task.can, 1.2 * env.task.fit.scale
-    assert env.state.position("can")[0, 2] == pytest.approx(size * can.height, abs=1e-5)
-
-
 def test_where_arms_stand_is_declared_too():
     cls = tasks.get_task_class("CellSetFaders-v1")
     turned = at_task("so101", cls).moved((0.5, 0.1, 0.0), yaw=1.0)

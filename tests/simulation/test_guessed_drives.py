@@ -79,23 +79,11 @@ def test_a_stretched_arm_moves_one_joint_alone_as_physics_has_its_motors(tmp_pat
     assert with_motors < 0.1 < without
 
 
-def test_efforts_bound_the_forces_where_they_suffice(tmp_path):
-    arm = guess_descriptor(weighing(0.5, 60.0).write(tmp_path), "made").descriptor
-    assert arm.action_split.groups["arm"].force_limit == 60.0
-
-
 def test_efforts_that_move_nothing_are_raised_and_the_reason_says_so(tmp_path):
     found = guess_descriptor(weighing(20.0, 1.0).write(tmp_path), "made")
     forces = [drive[2] for drive in found.descriptor.action_split.groups["arm"].drives]
     assert max(forces) > 100.0
     assert any("more than the URDF's efforts for a_joint1" in reason for reason in found.reasons)
-
-
-def test_it_stays_where_it_stands(tmp_path):
-    standing = Standing(weighing(5.0, 100.0), tmp_path)
-    standing.again()
-    after = standing.play(np.zeros(6, np.float32), 20)
-    np.testing.assert_allclose(after, standing.start, atol=1e-3)
 
 
 def test_every_joint_of_a_mimic_tree_goes_where_its_leader_sends_it(tmp_path):

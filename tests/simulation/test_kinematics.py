@@ -10,7 +10,7 @@ from layouts import Layout, Placement
 from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.solvers import InverseKinematics
-from robots import RobotRegistry, SimulationError, UnknownNameError
+from robots import RobotRegistry, SimulationError
 from tests.catalogue import QUICK
 
 # Robots whose TCP is a link; the others are refused, as a test below says.
@@ -26,7 +26,7 @@ def world_of(robot: str) -> BuiltWorld:
     return BuiltWorld(Layout({"arm": placement}))
 
 
-def rest(robot: str) -> np.ndarray:
+def start_of(robot: str) -> np.ndarray:
     """All joints of a keyframe."""
     return np.array(world_of(robot).layout["arm"].start_qpos)
 
@@ -66,7 +66,7 @@ def limits(robot: str, joints: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]
 @pytest.mark.parametrize("robot", [n for n in ROBOTS if n not in ("fetch", "xarm7_ability")])
 @pytest.mark.parametrize("seed", range(3))  # of a hundred, one finds no solution for xarm7
 def test_a_solution_reaches_the_request_within_the_limits(robot, seed):
-    kinematics, start = InverseKinematics(SapienArm(world_of(robot), "arm")), rest(robot)
+    kinematics, start = InverseKinematics(SapienArm(world_of(robot), "arm")), start_of(robot)
     low, high = limits(robot, kinematics.joints)
     rng = np.random.default_rng(seed)
     wish = start.copy()
@@ -85,25 +85,15 @@ def test_a_solution_reaches_the_request_within_the_limits(robot, seed):
     assert abs(turned @ quaternion) == pytest.approx(1, abs=1e-6)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
-def test_forward_agrees_with_the_physics_engine(robot):
-    kinematics = InverseKinematics(SapienArm(world_of(robot), "arm"))
-    arm = arm_of(robot, rest(robot)) + 0.1
-    position, quaternion = kinematics.forward(arm)
-    expected, turned = reference(robot, with_arm(robot, rest(robot), arm))
-    np.testing.assert_allclose(position, expected, atol=1e-6)
-    assert abs(quaternion @ turned) == pytest.approx(1, abs=1e-6)
-
-
 @pytest.mark.parametrize("robot", [n for n in ROBOTS if n not in FREE])
 def test_what_is_out_of_reach_has_no_solution(robot):
     kinematics = InverseKinematics(SapienArm(world_of(robot), "arm"))
-    assert kinematics.solve((1.8, -0.4, 0.2), (0.0, 1.0, 0.0, 0.0), rest(robot)) is None
+    assert kinematics.solve((1.8, -0.4, 0.2), (0.0, 1.0, 0.0, 0.0), start_of(robot)) is None
 
 
 def test_a_solution_never_passes_a_joint_limit():
     """This pose is natural with joint 6 at 4.4 rad, but that joint ends at 3.75."""
-    kinematics, start = InverseKinematics(SapienArm(world_of("panda"), "arm")), rest("panda")
+    kinematics, start = InverseKinematics(SapienArm(world_of("panda"), "arm")), start_of("panda")
     arm = np.array([0.0, 1.0, 0.0, -0.6, 0.0, 4.4, 0.0])
     position, quaternion = kinematics.forward(arm)
     solution = kinematics.solve(position, quaternion, start)
@@ -113,18 +103,10 @@ def test_a_solution_never_passes_a_joint_limit():
 
 def test_the_nearest_of_several_solutions_is_taken():
     """Where the robot already is needs no motion, however many other solutions there are."""
-    kinematics, start = InverseKinematics(SapienArm(world_of("panda"), "arm")), rest("panda")
+    kinematics, start = InverseKinematics(SapienArm(world_of("panda"), "arm")), start_of("panda")
     position, quaternion = reference("panda", start)
     solution = kinematics.solve(position, quaternion, start)
     np.testing.assert_allclose(solution, start[:7], atol=1e-3)
-
-
-def test_the_same_request_has_the_same_answer():
-    request = (0.4, -0.1, 0.4), (0.0, 1.0, 0.0, 0.0), rest("panda")
-    first, second = (
-        InverseKinematics(SapienArm(world_of("panda"), "arm")).solve(*request) for _ in range(2)
-    )
-    np.testing.assert_array_equal(first, second)
 
 
 def test_a_tcp_between_links_is_refused(monkeypatch):
@@ -133,11 +115,6 @@ def test_a_tcp_between_links_is_refused(monkeypatch):
     object.__setattr__(world.layout["arm"], "robot", _between_fingers(descriptor))
     with pytest.raises(SimulationError, match="mean of panda_leftfinger, panda_rightfinger"):
         InverseKinematics(SapienArm(world, "arm"))
-
-
-def test_an_unknown_robot_is_named():
-    with pytest.raises(UnknownNameError, match="unknown robot of this layout 'arn'.*'arm'"):
-        InverseKinematics(SapienArm(world_of("panda"), "arn"))
 
 
 def _between_fingers(descriptor):

@@ -1,7 +1,5 @@
 """Layouts in a simulation: rings of mixed robots, rigid moves, robots that hang."""
 
-import math
-
 import numpy as np
 import pytest
 
@@ -82,15 +80,6 @@ def test_at_automatic_distances_no_robot_touches_another(layout: Layout):
         first, second = contact.bodies
         if owners[first] != owners[second]:
             assert min(point.separation for point in contact.points) > 0, (first, second)
-
-
-def test_robots_of_a_ring_reach_towards_its_centre_whatever_their_own_front(eight: Simulation):
-    stand(eight)
-    state = eight.read()
-    for name, placement in EIGHT.items():
-        base = math.hypot(*placement.base_position)
-        tcp = math.hypot(*state.tcp_position(name)[0, :2])
-        assert 0.1 < base - tcp < placement.robot.reach
 
 
 def test_a_rigid_move_leaves_what_each_robot_sees_of_itself_unchanged():

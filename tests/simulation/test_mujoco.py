@@ -14,12 +14,11 @@ from robot_layouts.experts import find_expert
 from robot_layouts.simulation import Camera, PhysicsSettings, Simulation
 from robot_layouts.simulation.backend import SIMULATORS
 from robot_layouts.simulation.checks.overlaps import stand
-from robots import CONTROL_MODES, JointGroup, SimulationError
+from robots import CONTROL_MODES, SimulationError
 from tasks import Fixed, Light, Randomization, Shift, Uniform
 from tests.quick import quick_cases
 
 mujoco = pytest.importorskip("mujoco")
-from robot_layouts.simulation.mujoco.drives import LedGroup  # noqa: E402
 
 TASKS = ("PickCube-v1", "TwoRobotPickCube-v1")
 CUBE = Box((0.02, 0.02, 0.02))
@@ -225,28 +224,6 @@ def test_a_reset_forgets_what_was_touched():
         assert not info["is_grasped"][0]
         assert not env.state.contact_force("arm", "panda_leftfinger").any()
         assert not env.simulation.backend.touching()[0]
-
-
-def test_a_reset_leaves_other_worlds_alone():
-    env = made("PickCube-v1", num_envs=2)
-    env.reset(seed=0)
-    env.step(np.ones((2, 8), np.float32))
-    before = env.simulation.read()
-    env.reset(seed=5, env_ids=[1])
-    after = env.simulation.read()
-    assert (before.all_poses[:, 0] == after.all_poses[:, 0]).all()
-    assert (before.all_poses[:, 1] != after.all_poses[:, 1]).any()
-
-
-def test_joints_that_carry_fingers_lead_the_others():
-    group = JointGroup(
-        ("one", "other", "tip"), 0.0, 1.0, 10.0, 1.0, 5.0, mimic=True, leaders=("one", "other"),
-        lead=0.1, multipliers=(1.0, -1.0, 0.5), offsets=(0.0, 0.0, 0.2),
-    )  # fmt: skip
-    qpos, qvel = np.array([0.4, -0.2, 0.5]), np.array([0.3, -0.1, 0.0])
-    goals, speeds = LedGroup(group, 0).targets(0.9, qpos, qvel)
-    np.testing.assert_allclose(goals, [0.4, -0.4, 0.5 * 0.3 + 0.2])
-    np.testing.assert_allclose(speeds, [0.0, 0.0, 0.5 * 0.2])
 
 
 def test_arms_that_touch_are_named():

@@ -11,16 +11,9 @@ from objects.registry import CATALOGUE
 from objects.shapes import Box, ConvexHull, Friction
 from objects.solids import bounds, sampled, surface
 from robot_layouts.__main__ import main
-from robot_layouts.simulation import Camera, Simulation
-from robot_layouts.simulation.checks.objects import (
-    OPENINGS,
-    RestTrial,
-    try_rests,
-    try_thing_grasps,
-)
-from robot_layouts.simulation.rendering import vulkan_problem
+from robot_layouts.simulation import Simulation
+from robot_layouts.simulation.checks.objects import OPENINGS, RestTrial, try_rests, try_thing_grasps
 
-CORNERS = [(x, y, z) for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (-0.02, 0.02)]
 FEWEST_GRASPS = 20
 GRASPED = [name for name in CATALOGUE if ObjectRegistry.load(name).grasps]
 
@@ -88,57 +81,6 @@ def _planes(vertices, triangles):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     normals *= np.sign(np.einsum("ij,ij->i", one - vertices.mean(axis=0), normals))[:, None]
     return np.column_stack([normals, np.einsum("ij,ij->i", normals, one)])
-
-
-def pair(*, visuals=False):
-    """A world with a box, and beside it the hull of a box's corners, of other matter than usual."""
-    turned = (0.9659258262890683, 0.0, 0.0, 0.25881904510252074)  # 30° about z
-    rough = {
-        "density": 500.0,
-        "friction": Friction(0.9, 0.8, 0.1),
-        "position": (0.03, 0.0, 0.02),
-        "quaternion": turned,
-    }
-
-    def build(world, number):
-        world.add("box", Box((0.1, 0.05, 0.02), **rough), position=(1.0, -0.3, 0.3))
-        world.add("hull", ConvexHull(tuple(CORNERS), **rough), position=(1.0, 0.3, 0.3))
-
-    return Simulation(single({"arm": "panda"}), build, 1, visuals=visuals)
-
-
-def test_the_hull_of_a_boxes_corners_is_that_box():
-    simulation = pair()
-    box, hull = (simulation.backend.worlds[0].bodies[name].component for name in ("box", "hull"))
-    assert hull.mass == pytest.approx(box.mass)
-    assert np.allclose(hull.inertia, box.inertia, rtol=1e-5)
-    assert np.allclose(hull.cmass_local_pose.p, (0.03, 0.0, 0.02), atol=1e-6)
-    (one,), (other,) = box.collision_shapes, hull.collision_shapes
-    assert np.allclose(other.local_pose.p, one.local_pose.p)
-    assert np.allclose(other.local_pose.q, one.local_pose.q)
-    assert other.collision_groups == one.collision_groups
-    assert other.density == one.density
-    materials = [
-        (m.static_friction, m.dynamic_friction, m.restitution)
-        for m in (one.physical_material, other.physical_material)
-    ]
-    assert materials[0] == materials[1] == pytest.approx((0.9, 0.8, 0.1))
-
-
-def test_a_hull_is_drawn_as_that_box(renderer):
-    if problem := vulkan_problem():
-        pytest.skip(problem)
-    simulation = pair(visuals=True)
-    eyes = {
-        name: Camera((0.7, y, 0.5), (1.0, y, 0.3), name, 64, 64)  # away from the arm
-        for name, y in (("box", -0.3), ("hull", 0.3))
-    }
-    one, other = simulation.look(0, eyes, ("rgb", "segmentation"), markers=False)
-    seen = one.images["segmentation"][..., 0] != 0
-    assert seen.mean() > 0.03
-    assert (seen == (other.images["segmentation"][..., 0] != 0)).mean() > 0.995
-    colours = [view.images["rgb"][seen].astype(float) for view in (one, other)]
-    assert np.abs(colours[0] - colours[1]).mean() < 4
 
 
 def test_things_stand_still_for_ten_seconds():

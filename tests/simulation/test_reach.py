@@ -1,47 +1,16 @@
 """Inverse kinematics of a point leads there, for every robot, or says that it cannot."""
 
-import functools
-
 import numpy as np
 import pytest
 
-from layouts import Layout, Placement
 from robot_layouts.simulation.sapien3.arms import SapienArm
-from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.solvers import PointReach
-from robots import RobotRegistry, UnknownNameError
+from robots import UnknownNameError
 from tests.catalogue import QUICK
+from tests.simulation.test_kinematics import start_of, world_of
 
 ROBOTS = QUICK
 POINT = np.array([0.01, -0.02, 0.03])
-
-
-@functools.cache
-def world_of(robot: str) -> BuiltWorld:
-    """Make a world with one robot that neither stands at the origin nor faces along x."""
-    base = ((0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6))
-    return BuiltWorld(Layout({"arm": Placement(RobotRegistry.load(robot), *base)}))
-
-
-def start_of(robot: str) -> np.ndarray:
-    """All joints of a keyframe."""
-    return np.array(world_of(robot).layout["arm"].start_qpos)
-
-
-@pytest.mark.parametrize("robot", ROBOTS)
-def test_forward_agrees_with_the_physics_engine(robot):
-    simulated = world_of(robot).robots["arm"]
-    qpos = start_of(robot)
-    simulated.reset(qpos)
-    pose = simulated.links[simulated.descriptor.tcp_link].entity_pose
-    reach = PointReach(SapienArm(world_of(robot), "arm"))
-    position, quaternion = reach.forward(reach.arm(qpos))
-    np.testing.assert_allclose(position, pose.p, atol=1e-5)
-    assert abs(np.dot(quaternion, pose.q)) == pytest.approx(1, abs=1e-5)
-    expected = pose.to_transformation_matrix() @ [*POINT, 1.0]
-    np.testing.assert_allclose(
-        reach.place_of(POINT, reach.arm(qpos)), np.array(expected)[:3], atol=1e-5
-    )
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

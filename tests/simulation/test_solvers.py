@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 import pytest
 
 from layouts import Layout, Placement
-from layouts.frames import Pose
 from robot_layouts.simulation.sapien3.arms import PinocchioFollower, SapienArm
-from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robot_layouts.simulation.solvers import ArmModel, TreeArm, TreeFollower
 from robots import DescriptorError, RobotRegistry, UnknownNameError
 from tests.catalogue import QUICK
+from tests.simulation.test_kinematics import start_of, world_of
 
-BASE = ((0.3, -0.4, 0.1), (0.8, 0.0, 0.0, 0.6))
 POINT = np.array([0.01, -0.02, 0.03])
 HOW_FAR = 0.05  # rad, m
 HANDS = ("allegro_hand_right",)  # fingers of four joints that hardly tell some turns apart
 
 
-@functools.cache
-def world_of(robot: str) -> BuiltWorld:
-    """Make a world with one robot that neither stands at the origin nor faces along x."""
-    return BuiltWorld(Layout({"arm": Placement(RobotRegistry.load(robot), *BASE)}))
-
-
 def arms_of(robot: str) -> tuple[SapienArm, TreeArm]:
     world = world_of(robot)
     return SapienArm(world, "arm"), TreeArm(world.layout, "arm")
-
-
-def start_of(robot: str) -> np.ndarray:
-    return np.array(world_of(robot).layout["arm"].start_qpos)
 
 
 def moved(arm: ArmModel, qpos: np.ndarray) -> np.ndarray:
@@ -117,22 +103,6 @@ def test_what_cannot_be_reached_has_no_answer():
     follower = TreeFollower(RobotRegistry.load("panda"), "panda_hand_tcp", None, tree.joints)
     assert follower.follow((9.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), start) is None
     assert follower.follow((np.nan, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), start) is None
-
-
-def test_each_start_has_an_answer_of_its_own():
-    tree, start = arms_of("panda")[1], start_of("panda")
-    pose = tree.tcp_pose(moved(tree, start))
-    starts = np.array([start, start + 0.1, start - 0.1])
-    alone = [tree.descend(*pose, row[None])[0] for row in starts]
-    np.testing.assert_allclose(tree.descend(*pose, starts), alone, atol=1e-9)
-
-
-def test_a_base_may_stand_elsewhere_than_in_the_layout():
-    layout, start = world_of("panda").layout, start_of("panda")
-    tree = TreeArm(layout, "arm", Pose((1.0, 2.0, 0.0), (1.0, 0.0, 0.0, 0.0)))
-    other = TreeArm(Layout({"arm": Placement("panda", (1.0, 2.0, 0.0), (1, 0, 0, 0))}), "arm")
-    for one, same in zip(tree.tcp_pose(start[:7]), other.tcp_pose(start[:7]), strict=True):
-        np.testing.assert_array_equal(one, same)
 
 
 def test_a_follower_names_what_it_cannot_follow():

@@ -44,22 +44,6 @@ def test_joints_that_are_held_are_no_gripper():
     np.testing.assert_allclose(fetch.read().gripper_opening("arm"), [0.3])
 
 
-def test_base_positions_are_where_the_layout_says(env: TaskEnv):
-    state = state_of(env)
-    for name, y in (("left", -0.75), ("right", 0.75)):
-        np.testing.assert_allclose(state.base_position(name), [[0.0, y, 0.0]] * 2, atol=1e-6)
-
-
-def test_speed_and_spin_are_norms(env: TaskEnv):
-    for world in worlds_below(env.simulation):
-        world.bodies["cube"].component.set_linear_velocity([0.3, 0.0, 0.4])
-        world.bodies["cube"].component.set_angular_velocity([0.0, 2.0, 0.0])
-    env.simulation.touched()
-    state = state_of(env)
-    np.testing.assert_allclose(state.speed("cube"), [0.5, 0.5], rtol=1e-6)
-    np.testing.assert_allclose(state.spin("cube"), [2.0, 2.0], rtol=1e-6)
-
-
 def test_velocities_are_those_of_the_body_asked_for(env: TaskEnv):
     for world in worlds_below(env.simulation):
         world.bodies["cube"].component.set_linear_velocity([0.0, 0.0, 4.0])
@@ -102,16 +86,6 @@ def test_lengths_that_are_taken_together_are_those_of_single_rows(env: TaskEnv):
             assert norm(state.offset("cube", "goal_site")[row]) == away[row] > 0
             assert norm(state.offset("cube", "goal_site")[row, :2]) == aside[row] > 0
         state = state_of(env)
-
-
-def test_distances_outlast_the_speeds_that_are_asked_for_with_them(env: TaskEnv):
-    state_of(env).speed("cube")
-    unread = state_of(env)
-    away = state_of(env).distance("cube", "goal_site").tolist()
-    env.step(torch.zeros(2, 15))
-    assert unread.distance("cube", "goal_site").tolist() == away
-    with pytest.raises(SimulationError, match="no longer the present one"):
-        unread.speed("cube")
 
 
 def test_a_remembered_answer_is_that_of_the_same_question(env: TaskEnv):

@@ -118,17 +118,3 @@ class TestCommand:
         assert main(["robots", "inspect", "--try", "folded"]) == 1
         printed = capsys.readouterr().out
         assert "WRONG: the likely cause: at the start l" in printed
-
-    def test_a_urdf_is_reported_on_without_physics(self, tmp_path, capsys):
-        assert main(["robots", "inspect", str(save(tmp_path, arm()))]) == 0
-        assert "j3" in capsys.readouterr().out
-
-    def test_nothing_to_try_makes_no_sense(self, capsys):
-        with pytest.raises(SystemExit) as ended:
-            main(["robots", "inspect", "--try"])
-        assert ended.value.code == 2
-        assert "the following arguments are required: ROBOT" in capsys.readouterr().err
-
-    def test_a_file_that_is_not_there(self, tmp_path, capsys):
-        assert main(["robots", "inspect", str(tmp_path / "nowhere.urdf"), "--try"]) == 1
-        assert "nowhere.urdf" in capsys.readouterr().err

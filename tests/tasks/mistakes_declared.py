@@ -86,14 +86,6 @@ MISTAKES = (
         ),
     ),
     Mistake(
-        "an unknown reward mode",
-        dict(reward_modes=("densest",)),
-        (
-            "Tray.reward_modes is ('densest',); a tuple of normalized_dense, dense, sparse, none "
-            "is needed, the default first"
-        ),
-    ),
-    Mistake(
         "a dense mode without a dense reward",
         dict(reward_modes=("dense",), dense_reward=None),
         (

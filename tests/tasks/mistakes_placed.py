@@ -88,11 +88,6 @@ MISTAKES = (
         ),
     ),
     Mistake(
-        "a height in the place of a position",
-        sampling(lambda world, rng: world.set_pose("cube", 0.02)),
-        ("position of body 'cube' in environment 0 is 0.02; it must be 3 finite numbers (m)"),
-    ),
-    Mistake(
         "one name where several go",
         sampling(lambda world, rng: world.set_poses("cube", (0, 0, 0.02))),
         "set_poses takes several names; set_pose takes one, 'cube'",

@@ -1,28 +1,15 @@
 """``robot-layouts tasks list`` and ``describe``: what they print, and how they fail."""
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 import tasks
-from layouts import face_to_face, single
 from robot_layouts.__main__ import main
 from robots import TaskError
-from tasks.description import (
-    facts,
-    list_table,
-    parity_verdicts,
-    read_docstring,
-    robots_text,
-    short_modes,
-)
-from tasks.registry import CATALOGUE, other_names
+from tasks.description import facts, parity_verdicts, read_docstring
+from tasks.registry import CATALOGUE
 from tests.quick import quick_cases
-
-ROOT = Path(__file__).parents[2]
 
 
 class Waiting(tasks.MultiRobotTask):
@@ -37,10 +24,6 @@ class Waiting(tasks.MultiRobotTask):
     Attributes:
         patience: How long.
     """
-
-
-class Silent(Waiting):
-    pass
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -168,32 +151,3 @@ def test_a_docstring_has_parts():
     assert said.summary == "Wait for nothing."
     assert said.randomization == "A number is drawn.\nNothing else is."
     assert said.success == "at once, within 1 s."
-
-
-def test_a_docstring_is_the_class_own():
-    assert read_docstring(Silent) == type(read_docstring(Silent))("", "", "")
-
-
-def test_robots_in_words():
-    assert robots_text(single({"arm": "panda"})) == "panda"
-    pair = face_to_face({"left": "panda_stick", "right": "panda"}, spacing=1.0)
-    assert robots_text(pair) == "panda_stick + panda"
-    assert robots_text(pair.replace_robots(left="panda")) == "2 × panda"
-
-
-def test_short_modes_keep_their_order():
-    assert short_modes(("none", "normalized_dense")) == "none norm"
-
-
-def test_other_names_are_those_of_the_class():
-    assert other_names(tasks.get_task_class("PushT-v1")) == ("maniskill.push_t_native",)
-
-
-def test_a_list_of_no_tasks_is_a_heading():
-    assert list_table([], {}).row_count == 0
-
-
-@pytest.mark.long
-def test_importing_the_room_loads_no_rich():
-    code = "import sys, tasks; tasks.get_task_class('PickCube-v1'); sys.exit('rich' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0

@@ -1,71 +1,18 @@
-"""Joint positions as actions are native's to the last bit, and the same motion as deltas."""
+"""Joint positions as actions: their limits, and the same motion as deltas."""
 
 import numpy as np
 import pytest
 
 import tasks
 from layouts import single
-from parity.episodes import random_episodes
-from parity.lockstep import HISTORIES
 from robot_layouts.data.playing.mode_conversion import as_positions
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import CONTROL_MODES, DescriptorError, RobotRegistry, TaskError, UnknownNameError
-from tasks.episode import Episode, play
+from tasks.episode import play
 from tests.catalogue import every_robot
 from tests.motions import touching_episode
-from tests.native import NATIVE, TASKS, complaints, pair
-from tests.quick import quick_cases
 
 MODE = "pd_joint_pos"
-SOME_TASKS = ("PickCube-v1", "PickCubeSO100-v1", "PushT-v1", "TwoRobotPickCube-v1")
-SEEDS = (1, 2)
-
-
-def both_sides(task_id):
-    return pair(task_id, control_mode=MODE)
-
-
-def over_range_episodes(task_id, steps):
-    layout = both_sides(task_id).ours.env.layout
-    return random_episodes(SEEDS, steps, layout.action_dim, layout.action_bounds)
-
-
-def touching(task_id, seed):
-    """The scripted contact of a task as joint positions."""
-    episode = touching_episode(task_id, seed)
-    env = tasks.make(task_id, obs_mode="none")
-    return Episode(seed, as_positions(env, seed, episode.actions))
-
-
-def expect_native(task_id, history, episodes):
-    results = both_sides(task_id).play(episodes, history)
-    assert complaints(results) == []
-    return sum(result.contact_steps for result in results)
-
-
-class TestNative:
-    pytestmark = NATIVE
-
-    @pytest.mark.parametrize("task_id", quick_cases(SOME_TASKS, ["TwoRobotPickCube-v1"]))
-    def test_random_positions_and_scripted_contact(self, task_id):
-        episodes = [*over_range_episodes(task_id, 40), *(touching(task_id, s) for s in SEEDS)]
-        contacts = expect_native(task_id, "reused", episodes)
-        assert contacts >= 10, "hardly anything was touched"
-        native, ours = both_sides(task_id)
-        theirs = native.envs[0].single_action_space
-        spaces = list(theirs.values()) if hasattr(theirs, "values") else [theirs]
-        space = ours.env.single_action_space
-        np.testing.assert_array_equal(space.low, np.concatenate([s.low for s in spaces]))
-        np.testing.assert_array_equal(space.high, np.concatenate([s.high for s in spaces]))
-        assert space.dtype == spaces[0].dtype
-
-    @pytest.mark.long
-    @pytest.mark.parametrize("history", HISTORIES)
-    @pytest.mark.parametrize("task_id", TASKS)
-    def test_every_task(self, task_id, history):
-        episodes = over_range_episodes(task_id, 100)
-        episodes += [touching(task_id, seed) for seed in SEEDS]
-        expect_native(task_id, history, episodes)
 
 
 @pytest.mark.parametrize("task_id", ["PushT-v1", "TwoRobotPickCube-v1"])

@@ -3,8 +3,6 @@
 The device is the processor, where the same kernels run, but for how they are shared out.
 """
 
-import gc
-import sys
 from contextlib import closing
 
 import gymnasium
@@ -17,7 +15,7 @@ import tasks
 from robot_layouts.experts import find_expert
 from robots import ActionError, SimulationError, TaskError, UnknownNameError
 from tasks import Randomization, Uniform
-from tasks.interfaces.device import DeviceTask, chosen
+from tasks.interfaces.device import DeviceTask
 
 TASK = "PushCube-v1"
 STEPS = 4  # of an episode
@@ -25,10 +23,7 @@ APART = 1e-4  # rad, m: how far float32 may be from MuJoCo's float64
 # At 1, drives of Pandas are at their limit of force to the last bit, on either side of it.
 SHORT = np.float32(0.99)
 OBSERVED = 2e-3  # of observations, which have speeds in them (rad/s)
-REFUSED = {
-    "DrawTriangle-v1": "one by one",
-    "PegInsertionSide-v1": "geometry changes",
-}
+REFUSED = {"DrawTriangle-v1": "one by one", "PegInsertionSide-v1": "geometry changes"}
 
 
 def made(mode="NEXT_STEP", num_envs=3, task=TASK, **fields):
@@ -71,19 +66,6 @@ def test_a_card_that_is_not_there_is_named():
 def test_a_task_itself_is_not_made_on_a_device():
     with pytest.raises(TaskError, match=r"gymnasium.make_vec\('RobotLayouts/…'"):
         tasks.make(TASK, simulator="mujoco_warp")
-
-
-def test_starts_are_chosen_by_seed_and_episode_alone():
-    seeds, episodes = torch.arange(4000).repeat(2), torch.arange(2).repeat_interleave(4000)
-    rows = chosen(seeds, episodes, 100)
-    assert torch.equal(rows, chosen(seeds, episodes, 100))
-    assert torch.equal(rows[5:6], chosen(seeds[5:6], episodes[5:6], 100))
-    counts = torch.bincount(rows, minlength=100)
-    assert len(counts) == 100
-    assert counts.min() > 40  # of 80 on the average
-    assert counts.max() < 130
-    again = (rows[:4000] == rows[4000:]).float().mean()
-    assert 0.0 < again < 0.03  # one in a hundred by chance
 
 
 # -- episodes -------------------------------------------------------------------------------------
@@ -159,32 +141,6 @@ def test_equal_seeds_give_equal_bits_wherever_they_are(engine):
 
 
 @pytest.mark.long
-def test_a_step_calls_as_much_python_for_many_worlds_as_for_two(engine):
-    def calls(count):
-        counted = 0
-
-        def note(frame, event, argument):
-            nonlocal counted
-            counted += event in ("call", "c_call")
-
-        with closing(made("NEXT_STEP", count, "PickCube-v1")) as env:
-            env.reset(seed=0)
-            for _ in range(3):
-                env.step(torch.zeros(env.action_space.shape))
-            action = torch.zeros(env.action_space.shape)
-            gc.disable()  # which calls what others have asked it to call
-            sys.setprofile(note)
-            try:
-                env.step(action)
-            finally:
-                sys.setprofile(None)
-                gc.enable()
-        return counted
-
-    assert calls(2) == calls(7)
-
-
-@pytest.mark.long
 def test_actions_are_checked_before_anything_moves(engine):
     with closing(made()) as env:
         before, _ = env.reset(seed=0)
@@ -219,39 +175,32 @@ def test_a_world_that_diverges_is_truncated_and_begins_anew(engine):
         assert info["elapsed_steps"].tolist() == [2, 0]
 
 
+VARIED = Randomization(mass={"cube": Uniform(0.1, 9.0)}, stiffness={"arm": Uniform(0.5, 1.5)})
+
+
 @pytest.mark.long
-def test_what_varies_is_each_worlds_own(engine):
-    varied = Randomization(mass={"cube": Uniform(0.1, 9.0)}, stiffness={"arm": Uniform(0.5, 1.5)})
-    fields = {"randomization": varied, "task": "PickCube-v1"}
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"randomization": VARIED},
+        {"control_mode": "pd_ee_delta_pose"},
+        {"control_mode": "pd_ee_target_delta_pos"},
+        {"control_mode": "pd_joint_vel"},
+    ],
+)
+def test_what_varies_and_control_modes_are_those_of_mujoco(engine, fields):
     with (
-        closing(made("DISABLED", **fields)) as env,
-        closing(tasks.make("PickCube-v1", 3, simulator="mujoco", randomization=varied)) as host,
+        closing(made("DISABLED", task="PickCube-v1", **fields)) as env,
+        closing(tasks.make("PickCube-v1", 3, simulator="mujoco", **fields)) as host,
     ):
         env.reset(seed=30)
         host.reset(seed=30)
-        for _ in range(3):
+        for _ in range(4):
             action = torch.full(env.action_space.shape, 0.7)
             obs, *_ = env.step(action)
             seen, *_ = host.step(action)
             torch.testing.assert_close(obs, seen, atol=OBSERVED, rtol=0)
         assert (obs[0] - obs[1]).abs().max() > 0.01
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("mode", ["pd_ee_delta_pose", "pd_ee_target_delta_pos", "pd_joint_vel"])
-def test_control_modes_are_those_of_mujoco(engine, mode):
-    fields = {"control_mode": mode, "task": "PickCube-v1"}
-    with (
-        closing(made("DISABLED", **fields)) as env,
-        closing(tasks.make("PickCube-v1", 3, simulator="mujoco", control_mode=mode)) as host,
-    ):
-        env.reset(seed=0)
-        host.reset(seed=0)
-        for _ in range(4):
-            action = torch.rand(env.action_space.shape) * 2 - 1
-            obs, *_ = env.step(action)
-            seen, *_ = host.step(action)
-            torch.testing.assert_close(obs, seen, atol=OBSERVED, rtol=0)
 
 
 @pytest.mark.long
@@ -273,29 +222,6 @@ def test_each_world_has_the_instruction_of_its_seed(engine):
             seed=[2, None, None], options={"reset_mask": np.array([True, False, False])}
         )
         assert info["phrasing"].tolist() == [2, 6, 11]
-
-
-@pytest.mark.long
-def test_memory_grows_with_the_number_of_worlds_and_no_faster(engine):
-    import warp
-
-    def taken(count):
-        with closing(made(num_envs=count, task="PickCube-v1")) as env:
-            env.reset(seed=0)
-            env.step(torch.zeros(env.action_space.shape))
-            data = env.task.simulation.bodies._data
-            held = [part for own in (data, data.contact, data.efc) for part in vars(own).values()]
-            arrays = {id(part): part for part in held if isinstance(part, warp.array)}
-            tensors = [part for part in gc.get_objects() if isinstance(part, torch.Tensor)]
-            own = {
-                part.untyped_storage().data_ptr(): part for part in tensors if count in part.shape
-            }
-            kernels = sum(part.capacity for part in arrays.values())
-            return kernels, sum(part.untyped_storage().nbytes() for part in own.values())
-
-    (few, seen_few), (more, seen_more), (most, seen_most) = map(taken, (61, 122, 244))
-    assert most - more == 2 * (more - few) > 0
-    assert seen_most - seen_more <= 2.1 * (seen_more - seen_few)
 
 
 # -- every task -----------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 import tasks
-from layouts import Layout, Placement, grid, single
+from layouts import grid, single
 from robots import RobotRegistry
 
 
@@ -58,7 +58,3 @@ def test_a_layout_that_cannot_be_drawn_is_a_table(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     drawn = single({"arm": "panda"})._repr_html_()
     assert drawn.startswith("<pre>1 robot, 8 action numbers\n")
-
-
-def test_what_hangs_on_nothing_is_short():
-    assert len(repr(Layout({"arm": Placement("panda")})["arm"])) < 220

@@ -61,9 +61,3 @@ def test_a_partial_reset_wipes_one_canvas_only():
     assert drawn(env, 1) == []
     assert torch.equal(obs[0, corners], before[0, corners])
     assert not torch.equal(obs[1, corners], before[1, corners])
-
-
-def test_only_the_sparse_reward_is_offered_as_in_native():
-    assert tasks.get_task_class("DrawTriangle-v1").reward_modes == ("sparse",)
-    with pytest.raises(ValueError, match="reward_mode 'none' is not offered"):
-        tasks.make("DrawTriangle-v1", reward_mode="none")

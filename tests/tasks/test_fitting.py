@@ -9,7 +9,7 @@ import tasks
 from layouts import Layout, at_task, face_to_face, side_by_side
 from layouts.shared_place import shared_place
 from robots import TaskError
-from tasks.language.fitting import AS_DECLARED, Fit
+from tasks.language.fitting import AS_DECLARED
 from tasks.registry import make_scenario
 
 TASK = "TwoRobotHandOver-v1"
@@ -68,12 +68,6 @@ def test_the_frame_turns_with_the_arms():
     straight, turned = (tasks.make(TASK, layout=a).task.fit for a in (two("koch"), layout))
     assert turned.yaw - straight.yaw == pytest.approx(pi / 2, abs=1e-3)
     assert turned.scale == pytest.approx(straight.scale, rel=0.2)
-
-
-def test_places_are_scaled_then_turned_then_shifted():
-    fit = Fit(2.0, x=1.0, y=-1.0, yaw=pi / 2)
-    assert fit.place((0.1, 0.0, 0.3)) == pytest.approx((1.0, -0.8, 0.6))
-    assert fit.turned((1.0, 0.0, 0.0, 0.0)) == pytest.approx((0.5**0.5, 0.0, 0.0, 0.5**0.5))
 
 
 def test_a_narrow_gripper_gets_what_it_can_hold():

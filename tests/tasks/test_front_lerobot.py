@@ -118,19 +118,6 @@ def test_success_is_told_when_the_episode_ends_and_from_then_on(played, plan):
     assert np.delete(truncated, SOLVED, 1)[-1].all()
 
 
-def test_what_is_over_earns_nothing_more(played):
-    ended = np.array([step[2] | step[3] for step in played])
-    rewards = np.array([step[1] for step in played])
-    assert not rewards[1:][ended[:-1]].any()
-    assert rewards[ended & ~np.roll(ended, 1, 0)][0] > 0  # the last step itself counts
-
-
-def test_a_reset_begins_anew(env, played):
-    env.reset(seed=SEEDS, options=THEIRS)
-    *_, terminated, truncated, info = env.step(np.zeros((3, 16), np.float32))
-    assert not (terminated | truncated | info["is_success"]).any()
-
-
 def test_only_what_is_reset_begins_anew(env, plan):
     env.reset(seed=SEEDS)
     *_, (_, _, terminated, _, _) = steps(env, plan)
@@ -156,31 +143,6 @@ def test_episodes_are_those_of_an_evaluation(env, played, plan):
         assert expected[seed].success == again[-1][4]["is_success"][i]
         total = sum(float(step[1][i]) for step in again)
         assert expected[seed].total == pytest.approx(total, rel=1e-12)
-
-
-@pytest.mark.long
-def test_nothing_stays_of_what_was_played_before(plan):
-    """Contacts that PhysX remembers would show in the last bits: worlds are rebuilt."""
-    with closing(make(num_envs=1)) as used, closing(make(num_envs=1)) as fresh:
-        used.reset(seed=[SEEDS[0]], options=THEIRS)
-        for action in plan_of(SEEDS[0]):
-            used.step(action[None])
-        for vector in (used, fresh):
-            vector.reset(seed=[SEEDS[SOLVED]], options=THEIRS)
-        for action in plan:
-            one, other = (vector.step(action[None])[0] for vector in (used, fresh))
-            assert all(np.array_equal(one[name], other[name]) for name in one)
-
-
-@pytest.mark.long
-def test_processes_change_nothing(env, plan):
-    with closing(make(num_workers=2)) as spread:
-        for vector in (env, spread):
-            vector.reset(seed=SEEDS, options=THEIRS)
-        for one, other in zip(steps(env, plan), steps(spread, plan), strict=True):
-            for name in one[0]:
-                assert np.array_equal(one[0][name], other[0][name])
-            assert all(np.array_equal(a, b) for a, b in zip(one[1:4], other[1:4], strict=True))
 
 
 def test_films_are_black_where_nothing_is_drawn(env):

@@ -11,14 +11,13 @@ from objects import ObjectRegistry
 from robot_layouts.__main__ import main
 from robot_layouts.data.export.columns import ColumnReader
 from robot_layouts.data.reading.recording import Recording
-from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts import thing_grips
 from robot_layouts.experts.obstacles import obstacles
 from robot_layouts.experts.script import Scene
 from robots import DescriptorError, TaskError, UnknownNameError
 from tasks import Area, Fixed, MultiRobotTask, Object, Randomization, register_task
-from tasks.episode import play
 from tasks.view import recorded_motion, task_cell
+from tests.tasks.own import recorded
 
 ID = "TestOpenUp-v1"
 
@@ -49,14 +48,7 @@ def _registered():
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    task = tasks.make(ID, obs_mode="none")
-    random = np.random.default_rng(0)
-    path = tmp_path_factory.mktemp("jointed") / "trajectory.h5"
-    with Recorder(path, task) as recorder:
-        for seed in (3, 5):
-            actions = random.uniform(-1, 1, (20, task.layout.action_dim)).astype(np.float32)
-            recorder.add(play(task, seed, actions))
-    return path
+    return recorded(ID, tmp_path_factory.mktemp("jointed"))
 
 
 def test_joints_begin_where_they_are_drawn_and_go_on_by_physics():

@@ -28,14 +28,6 @@ def test_colliding_robots_are_refused_with_their_links_and_what_to_change():
     assert "check_layout=False builds it all the same" in message
 
 
-def test_they_are_built_if_told_so():
-    tasks.make(TWO, layout=crowded(), check_layout=False).close()
-
-
-def test_a_layout_that_is_clear_is_built():
-    tasks.make(TWO, layout=face_to_face(PANDAS, spacing=1.4)).close()
-
-
 def test_a_folded_arm_that_grazes_itself_with_joint_noise_is_built():
     layout = side_by_side({f"arm_{i}": "koch" for i in range(6)}, spacing="auto")
     assert layout.validate(workspaces=False).findings
@@ -58,23 +50,6 @@ def test_a_users_own_layout_is_checked_as_another_one_is():
         Crowded(Crowded.scenario)
     Crowded(replace(Crowded.scenario, check_layout=False)).close()
     Crowded(replace(Crowded.scenario, layout=FreeRobots.layout)).close()
-
-
-def test_the_own_layout_of_a_task_of_this_library_costs_nothing(monkeypatch):
-    def fail(layout, table):
-        raise AssertionError("checked")
-
-    monkeypatch.setattr("tasks.engine.env.refuse_collisions", fail)
-    tasks.make(TWO).close()
-    with pytest.raises(AssertionError, match="checked"):
-        tasks.make(TWO, layout=crowded())
-
-
-def test_a_verdict_is_remembered(monkeypatch):
-    layout = side_by_side({"a": "panda", "b": "panda_stick"}, spacing=0.7)
-    refuse_collisions(layout)
-    monkeypatch.setattr(Layout, "validate", None)
-    refuse_collisions(side_by_side({"a": "panda", "b": "panda_stick"}, spacing=0.7))
 
 
 def test_without_fcl_it_warns_with_the_command(monkeypatch):

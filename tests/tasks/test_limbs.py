@@ -7,7 +7,6 @@ from math import pi
 import gymnasium
 import numpy as np
 import pytest
-import torch
 
 import tasks
 from layouts import Layout, Placement, at_task
@@ -16,13 +15,10 @@ from robot_layouts.kinematics.rotations import rotation_of
 from robots import TaskError, UnknownNameError
 from tasks.episode import play
 from tasks.registry import TASKS, make_scenario
-from tests.catalogue import optional_problem
 
 TWO = "TwoRobotPickCube-v1"
 # High behind the table, as its column reaches 1.6 m down: what is looked at here needs no reach.
 CELL = Layout({"cell": Placement("mobile_panda_dual", position=(2.5, 0.0, 1.0), rpy=(0, 0, pi))})
-# Baxter behind the table's far edge, its left arm on the side of the cube.
-BAXTER = {"cell": ("baxter", (0.7, 0.0, 0.2))}
 
 
 @pytest.fixture(scope="module")
@@ -102,42 +98,9 @@ def test_a_body_takes_all_places_or_none(task, place):
         tasks.make(task, robots={place: "baxter"})
 
 
-def test_a_body_stands_at_a_task_of_one_place():
-    (placement,) = make_scenario(
-        tasks.get_task_class("PickCube-v1"), robots="baxter"
-    ).layout.values()
-    assert "arm" in placement.robot.limbs
-
-
 def test_places_that_no_limb_takes_are_refused():
     with pytest.raises(TaskError, match=r"places \['left', 'right'\]; .* \['cell'\]"):
         tasks.make(TWO, layout=Layout({"cell": Placement("panda")}))
-
-
-@pytest.mark.parametrize("mode", ["pd_joint_delta_pos", "pd_joint_pos"])
-def test_control_modes_are_those_of_the_whole_robot(mode):
-    env = tasks.make(TWO, layout=CELL, control_mode=mode)
-    assert env.action_split == CELL.action_split
-    low = env.single_action_space.low
-    assert (low[:7] < -1.5).any() == (mode == "pd_joint_pos")
-
-
-@pytest.mark.long
-@pytest.mark.example_robots
-def test_baxter_hands_over():
-    if problem := optional_problem():
-        pytest.skip(problem)
-    layout = Layout(
-        {n: Placement(robot, position=p, rpy=(0, 0, pi)) for n, (robot, p) in BAXTER.items()}
-    )
-    env = tasks.make(TWO, layout=layout)
-    plan = find_expert(TWO)
-    for seed in (0, 1):
-        actions = plan(env, seed)
-        env.reset(seed=seed, options={"reconfigure": True})
-        for action in actions:
-            *_, info = env.step(torch.from_numpy(action)[None])
-        assert info["success"].item()
 
 
 def test_a_task_may_be_declared_with_a_robot_of_two_arms():
@@ -192,13 +155,6 @@ def test_a_body_stands_behind_the_table_with_its_hands_over_it(body):
         assert 0.1 < z < 0.3
         assert rotation_of(state.tcp_pose(place)[0, 3:])[2, 2] < -0.9  # the gripper points down
     assert table[0] < frame.x < table[2]
-
-
-def test_a_body_where_the_task_says_no_table_is_put_by_reach_alone(body):
-    own = tasks.get_task_class(HAND_OVER)
-    behind, nowhere = body.layout, at_task("mobile_panda_dual", own.layout)
-    assert nowhere["robot"].base_position[0] < behind["robot"].base_position[0]
-    assert nowhere["robot"].base_position[2] == behind["robot"].base_position[2]
 
 
 def test_a_body_drifts_nowhere_while_its_arm_moves(body):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from parity.episodes import random_episodes
-from parity.lockstep import HISTORIES, differing, select
+from parity.lockstep import HISTORIES, differing
 from tasks.episode import Episode
 from tests.motions import touching_episode
 from tests.native import NATIVE, TASKS, Pair, complaints, pair
@@ -35,16 +35,6 @@ def test_random_and_scripted_episodes_side_by_side(task_id, history):
     assert complaints(results) == []
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("task_id", TASKS)
-def test_one_seed_counts_up(task_id):
-    both = pair(task_id, num_envs=NUM_ENVS)
-    both.forget()
-    native = both.native.reset(range(70, 70 + NUM_ENVS), range(NUM_ENVS), rebuild=False)
-    obs, _ = both.ours.env.reset(seed=70)
-    np.testing.assert_array_equal(obs.numpy(), native["observation", "observation"])
-
-
 @pytest.mark.parametrize("task_id", BATCHED)
 def test_partial_resets_midway(task_id):
     both = pair(task_id, num_envs=NUM_ENVS)
@@ -65,20 +55,3 @@ def expect_untouched(both: Pair, before: dict, env_ids: list[int]) -> None:
     for group, entries in before.items():
         for name, rows in entries.items():
             np.testing.assert_array_equal(after[group][name][env_ids], rows[env_ids])
-
-
-@pytest.mark.parametrize("task_id", BATCHED)
-def test_last_batch_may_be_smaller(task_id):
-    both = pair(task_id, num_envs=NUM_ENVS)
-    episodes = random_episodes(range(NUM_ENVS + 2), 5, both.ours.action_dim)
-    assert complaints(both.play(episodes)) == []
-
-
-@pytest.mark.long
-def test_rows_belong_to_their_own_environment():
-    """A batch whose rows were shuffled is noticed."""
-    both = pair("PickCube-v1", num_envs=NUM_ENVS)
-    both.forget()
-    both_rows = [side.reset(range(NUM_ENVS), range(NUM_ENVS), rebuild=False) for side in both]
-    shuffled = select(both_rows[1], [1, 0, *range(2, NUM_ENVS)])
-    assert ("observation", "observation") in differing(both_rows[0], shuffled)

@@ -1,7 +1,5 @@
 """Things of the registry as bodies of a task: built, placed, recorded, played again, exported."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -10,9 +8,7 @@ from layouts import single
 from objects import ObjectRegistry
 from robot_layouts.__main__ import main
 from robot_layouts.data.export.dataset import Export, export
-from robot_layouts.data.recording.recorder import Recorder
 from robot_layouts.experts.obstacles import _obstacle
-from robot_layouts.simulation.rendering import vulkan_problem
 from robots import DescriptorError, TaskError, UnknownNameError
 from tasks import (
     Area,
@@ -25,8 +21,8 @@ from tasks import (
     add_object,
     register_task,
 )
-from tasks.episode import play
 from tasks.view import body_parts
+from tests.tasks.own import recorded
 
 ID = "TestSetTheTable-v1"
 
@@ -53,14 +49,7 @@ def _registered():
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):
-    task = tasks.make(ID, obs_mode="none")
-    random = np.random.default_rng(0)
-    path = tmp_path_factory.mktemp("objects") / "trajectory.h5"
-    with Recorder(path, task) as recorder:
-        for seed in (3, 5):
-            actions = random.uniform(-1, 1, (20, task.layout.action_dim)).astype(np.float32)
-            recorder.add(play(task, seed, actions))
-    return path
+    return recorded(ID, tmp_path_factory.mktemp("objects"))
 
 
 def test_things_lie_where_episodes_begin_with_them_and_stay_there():
@@ -109,13 +98,6 @@ def test_what_no_thing_can_be_is_refused_where_it_is_declared(declare, error, me
         declare()
 
 
-def test_a_thing_may_be_a_descriptor_and_larger():
-    mug = replace(ObjectRegistry.load("mug"), name="mine")
-    assert Object(mug).shapes == mug.parts
-    large = Object("mug", scale=1.5)
-    assert large.descriptor.sizes["height"] == pytest.approx(1.5 * mug.sizes["height"])
-
-
 def test_add_object_puts_it_down_as_it_rests():
     world = World(single({"arm": "panda"}))
     lying = ObjectRegistry.load("can").rest("lying")
@@ -139,21 +121,7 @@ def test_pages_and_motions_know_the_parts():
         assert np.ptp(corners, axis=0) == pytest.approx(thing.extent, rel=0.01)
 
 
-def test_its_size_can_vary_and_it_stands_where_it_did():
-    env = tasks.make(ID, randomization=Randomization(size={"mug": Fixed(1.2)}))
-    env.reset(seed=0)
-    mug = ObjectRegistry.load("mug")
-    component = env.simulation.backend.worlds[0].bodies["mug"].component
-    assert component.mass == pytest.approx(1.2**3 * mug.mass, rel=0.01)
-    start = env.state.pose("mug")
-    for _ in range(10):
-        env.step(np.zeros((1, 8)))
-    assert np.abs(env.state.pose("mug") - start).max() < 1e-3
-
-
-def test_a_pattern_covers_it_in_pictures(renderer):
-    if problem := vulkan_problem():
-        pytest.skip(problem)
+def test_a_pattern_covers_it_in_pictures(drawn):
     checker = Texture(kinds=("checker",), cells=Fixed(4))
     pictures: list[np.ndarray] = []
     for varied in (None, Randomization(textures={"pot": checker})):

@@ -68,21 +68,6 @@ def test_each_zone_is_in_reach_of_both(layout: Layout):
             assert 0.6 <= share <= FARTHEST_REACH
 
 
-def test_zones_follow_a_layout_that_is_moved():
-    layout = mixed(5)
-    moved = layout.moved((1.0, -2.0, 0.0), yaw=np.pi / 2)
-    expected = [(1.0 - y, -2.0 + x) for x, y in find_zones(layout)]
-    np.testing.assert_allclose(find_zones(moved), expected, atol=1e-9)
-
-
-def test_zones_lie_inwards_whichever_way_the_robots_go_round():
-    layout = mixed(8, 1.0, ("panda",))
-    zones = find_zones(layout)
-    assert max(hypot(x, y) for x, y in zones) < 0.6 < np.cos(np.pi / 8)
-    backwards = find_zones(Layout(dict(reversed(list(layout.items())))))
-    np.testing.assert_allclose(sorted(backwards), sorted(zones), atol=1e-9)
-
-
 def test_robots_too_far_apart_are_named():
     with pytest.raises(TaskError, match="'robot0' and 'robot1' stand 1.73 m apart.*Move them"):
         tasks.make(TASK, layout=mixed(3, 1.0))

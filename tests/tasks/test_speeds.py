@@ -95,16 +95,6 @@ def test_far_beyond_that_is_an_error():
     env.step(STILL)
 
 
-@pytest.mark.usefixtures("strict")
-def test_environments_that_stand_still_are_not_looked_at():
-    env = make()
-    loose(env)
-    throw(env, 1, 45.0)
-    env.step(STILL, env_ids=[0])
-    with pytest.raises(SimulationError, match="in environment 1 at step 1"):
-        env.step(STILL, env_ids=[1])
-
-
 def step_until_refused(env):
     for _ in range(50):
         env.step(np.zeros((1, 16), np.float32))

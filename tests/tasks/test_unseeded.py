@@ -9,7 +9,6 @@ import pytest
 import tasks
 from robots import TaskError
 from tasks.interfaces.vector import VectorTask
-from tasks.language.randomness import FirstSeeds
 
 TASK = "PushCube-v1"
 STILL = np.zeros(8, np.float32)
@@ -123,27 +122,8 @@ def test_an_ended_episode_keeps_its_seed_in_its_last_info():
     assert info["final_info"]["seed"].tolist() == info["seed"].tolist() == [7, 8, 9]
 
 
-def test_stable_baselines3_says_it_too():
-    pytest.importorskip("stable_baselines3")
-    first, second = (tasks.sb3_vec_env(TASK, num_envs=2, num_workers=0) for _ in range(2))
-    obs = first.reset()
-    assert not np.array_equal(second.reset(), obs)
-    seeds = [info["seed"] for info in first.reset_infos]
-    second.seed(seeds[0])
-    np.testing.assert_array_equal(second.reset(), obs)
-    infos = second.step(np.zeros((2, 8), np.float32))[3]
-    assert {*infos[0]} - {"TimeLimit.truncated"} == {*second.reset_infos[0]}
-
-
 def test_the_task_itself_begins_with_natives_seeds():
     env, other = tasks.make(TASK, num_envs=2), tasks.make(TASK, num_envs=2)
     assert env.seeds == [2022, 2023]
     assert (env.reset()[0] == other.reset()[0]).all()
     assert "seed" not in env.reset()[1]
-
-
-def test_first_seeds_fit_all_environments():
-    seeds = FirstSeeds(2**32)
-    assert seeds.fill([None, 4], [0, 1]) == [0, 4]
-    seeds.given([0])
-    assert seeds.fill([None], [0]) == [None]

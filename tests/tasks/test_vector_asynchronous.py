@@ -14,7 +14,6 @@ from tasks.interfaces.vector import VectorTask
 from tasks.interfaces.workers import partition
 from tests.quick import quick_cases
 from tests.tasks.test_vector import differences, make
-from tests.tasks.test_vector_failures import interrupted
 
 NUM_ENVS = 5
 STEPS = 56  # an episode of PushCube, and some of the next
@@ -180,33 +179,6 @@ def test_a_reset_forgets_what_was_sent(shared):
     shared.send(np.ones((NUM_ENVS, 8), np.float32), EVERYONE)
     shared.reset(options={"reset_mask": EVERYONE < 3})
     assert shared.recv()[4]["env_id"].tolist() == [3, 4]
-
-
-@pytest.mark.long
-def test_it_is_of_use_after_an_interrupt_at_any_instruction(shared):
-    def hears(code):
-        return code.co_name in ("read", "receive", "wait", "_take", "take")
-
-    first = np.array([action(i, 0) for i in EVERYONE])
-    shared.reset(seed=3)
-    wanted = shared.step(first)[0]
-
-    def both():
-        shared.send(first, EVERYONE)
-        shared.recv()
-        shared.recv()
-
-    moment, met = 1, 0
-    while interrupted(moment, "opcode", hears, both):
-        shared.batch_size = 1
-        while shared._backend.pending.env_ids:
-            shared.recv()
-        shared.batch_size = 2
-        shared.reset(seed=3)
-        np.testing.assert_array_equal(shared.step(first)[0], wanted)
-        shared.reset(seed=3)
-        moment, met = moment + 5, met + 1  # some of them: each takes a reset
-    assert met > 20
 
 
 @pytest.mark.parametrize(

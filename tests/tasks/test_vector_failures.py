@@ -79,24 +79,6 @@ def test_a_worker_that_fails_is_reported_and_replaced(shared, how):
     assert len(workers()) == 2
 
 
-def test_after_an_interrupted_step_the_next_one_is_right(shared):
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    shared.reset(seed=0)
-    victim = first_worker(shared)
-    before = signal.signal(signal.SIGALRM, interrupt)
-    try:
-        os.kill(victim, signal.SIGSTOP)
-        signal.setitimer(signal.ITIMER_REAL, 0.3)
-        with pytest.raises(KeyboardInterrupt):
-            shared.step(ACTION)
-    finally:
-        signal.signal(signal.SIGALRM, before)
-        os.kill(victim, signal.SIGCONT)
-    assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [2, 2, 2, 2]
-
-
 def interrupted(moment, event, matches, call):
     """Call something, and raise KeyboardInterrupt at the nth line or instruction of some code.
 
@@ -182,16 +164,6 @@ def test_a_restart_that_fails_may_be_tried_again(shared, monkeypatch):
     assert not {living, *(worker.pid for worker in started)} & {*workers()}
     shared.restart()
     assert shared.step(ACTION)[4]["elapsed_steps"].tolist() == [1, 1, 1, 1]
-
-
-@pytest.mark.long
-def test_an_error_in_a_worker_is_told_with_its_place(shared):
-    with pytest.raises(
-        VectorWorkerError, match=r"failed in no_such_method\(\) with AttributeError: .*workers.py"
-    ):
-        shared._call("no_such_method", {0: ()}, lambda: None)
-    shared.restart()
-    assert shared.step(ACTION)[0].shape == (4, 42)
 
 
 def test_closing_leaves_nothing():

@@ -89,5 +89,6 @@ def hold(model, data, cell):
     return drift
 
 
-for cell_name, cell_layout in cells(sys.argv[2:]).items():
-    check(cell_name, cell_layout, Path(sys.argv[1]))
+if __name__ == "__main__":
+    for cell_name, cell_layout in cells(sys.argv[2:]).items():
+        check(cell_name, cell_layout, Path(sys.argv[1]))

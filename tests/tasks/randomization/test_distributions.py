@@ -64,12 +64,6 @@ def test_mean_and_deviation_are_those_of_the_distribution(
     assert statistics.pstdev(values) == pytest.approx(std, rel=0.02)
 
 
-def test_whole_numbers_come_equally_often() -> None:
-    values = drawn(Whole(3, 5))
-    assert {3, 4, 5} == set(values)
-    assert all(abs(values.count(n) / len(values) - 1 / 3) < 0.015 for n in (3, 4, 5))
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
