@@ -244,7 +244,12 @@ def find_fingers(
             " own frame, changes that"
         )
     one, other = tips.touching(ends[0]), tips.touching(ends[1])
-    swings = any(joint.type != "prismatic" for joint in limb.fingers)
+    swings = any(
+        joint.type != "prismatic"
+        for end in ends
+        for joint in tips.stance.model.path_to(end)
+        if joint in limb.fingers
+    )
     opening, axes = zip(*map(_signed_axis, tips.opening(ends, postures)), strict=True)
     fingers = Fingers(
         (one, other), opening, max_angle=WIDE if swings else Fingers.max_angle, opening_axes=axes

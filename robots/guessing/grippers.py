@@ -30,7 +30,7 @@ from robots.guessing.drives import (
     drive_fields,
 )
 from robots.guessing.fingertips import Fingertips
-from robots.guessing.groups import by_steps, name_of
+from robots.guessing.groups import by_steps, held_still, name_of
 from robots.guessing.stance import Stance, middle_of
 from robots.urdf.model import ModelJoint
 
@@ -87,6 +87,34 @@ def find_gripper(limb: LimbJoints, tips: Fingertips, drives: Drives) -> Gripper:
     name = name_of(limb, "gripper")
     followers = _followers(limb.fingers)
     leaders = [joint for joint in limb.fingers if joint.name in followers]
+    idle = [joint for joint in leaders if not _moves_a_tip(followers[joint.name], tips)]
+    if 0 < len(idle) < len(leaders):
+        moving = [joint for joint in leaders if joint not in idle]
+        return _with_idle(name, idle, _driven(limb, name, moving, followers, tips, drives), drives)
+    return _driven(limb, name, leaders, followers, tips, drives)
+
+
+def _moves_a_tip(followers: Sequence[MimicJoint], tips: Fingertips) -> bool:
+    own = {follower.joint.name for follower in followers}
+    paths = (tips.stance.model.path_to(end) for end in tips.ends)
+    return any(joint.name in own for path in paths for joint in path)
+
+
+def _with_idle(name: str, idle: Sequence[ModelJoint], driven: Gripper, drives: Drives) -> Gripper:
+    """Return a hand that also has joints which move no finger, such as a motor's shaft."""
+    held = held_still(f"{name}_idle", idle, drives)
+    reason = f"{name}, held still: {_listing(idle)}, by which no finger tip moves"
+    return Gripper({**driven.groups, **held}, driven.postures, (*driven.reasons, reason))
+
+
+def _driven(
+    limb: LimbJoints,
+    name: str,
+    leaders: Sequence[ModelJoint],
+    followers: Mapping[str, list[MimicJoint]],
+    tips: Fingertips,
+    drives: Drives,
+) -> Gripper:
     merged = _merged(leaders, followers, tips)
     if merged:
         reasons = [f"{name}: one number drives {_listing(leaders)}, as they move alike"]

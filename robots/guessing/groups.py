@@ -37,14 +37,22 @@ def held_groups(anatomy: Anatomy, drives: Drives) -> dict[str, JointGroup]:
     """
     groups: dict[str, JointGroup] = {}
     for part in PARTS:
-        for name, joints in _by_unit(part, anatomy.parts.get(part, ())):
-            fields = drive_fields([drives.holding(joint) for joint in joints])
-            groups[name] = JointGroup.hold(_names(joints), unit=joints[0].unit, **fields)
+        groups.update(held_still(part, anatomy.parts.get(part, ()), drives))
     for name, joints in _by_unit("base", anatomy.base):
         groups[name] = JointGroup.hold(
             _names(joints), stiffness=1e5, damping=1e4, force_limit=1e5, unit=joints[0].unit
         )
     return groups
+
+
+def held_still(part: str, joints: Sequence[ModelJoint], drives: Drives) -> dict[str, JointGroup]:
+    """Return the groups of joints that stay where they start, by name: those that slide apart."""
+    return {
+        name: JointGroup.hold(
+            _names(own), unit=own[0].unit, **drive_fields([drives.holding(joint) for joint in own])
+        )
+        for name, own in _by_unit(part, joints)
+    }
 
 
 def by_steps(

@@ -15,6 +15,7 @@ from robots.bodies.overlaps import overlapping
 from robots.from_urdf import Guess, guess_descriptor
 from robots.guess import guess as guess_robot
 from robots.guessing.hints import Hints
+from robots.parts import Fingers
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from tests.robots.urdf_parts import Parts
@@ -219,6 +220,19 @@ def knuckles(parts: Parts, palm: str) -> None:
 
 
 class TestHands:
+    def test_a_shaft_that_moves_no_finger_is_held_still(self, tmp_path):
+        parts, last = single_arm(end="")
+        parts.jaws(last, "a")
+        parts.link("shaft", 0.02, "0.01 0.01 0.01")
+        parts.joint("gripper", last, "shaft", "0.02 0 0", axis="1 0 0", kind="continuous")
+        found = guess(parts, tmp_path)
+        groups = found.descriptor.action_split.groups
+        assert groups["gripper"].joints == ("a_slide_one", "a_slide_two")
+        assert groups["gripper_idle"].held
+        assert groups["gripper_idle"].joints == ("gripper",)
+        assert found.descriptor.fingers.max_angle == Fingers.max_angle  # they do not swing
+        assert any("held still: gripper, by which no finger tip moves" in r for r in found.reasons)
+
     def test_a_mimic_tree_takes_one_number_that_drives_every_joint(self, tmp_path):
         parts, last = single_arm(end="")
         knuckles(parts, last)
