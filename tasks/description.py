@@ -211,7 +211,7 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
         ("success", text.success),
         ("episode", f"{env.max_episode_steps} steps, {env.scenario.control_frequency:g} per s"),
         ("reward modes", ", ".join([f"{cls.reward_modes[0]} (default)", *cls.reward_modes[1:]])),
-        ("source", cls.source or ("" if origin(cls.task_id) else OWN_SOURCE)),
+        ("source", source_of(cls)),
         ("other names", ", ".join([*_full_name(cls), *other_names(cls)])),
         ("from", origin(cls.task_id) or OURS),
         ("parity", _parity(env)),
@@ -233,6 +233,11 @@ def describe(env: TaskEnv) -> Iterator[RenderableType]:
     yield observation_table(env.observation_slices, env.observer.senses)
     yield "Cameras, with obs_mode='rgb' or 'rgbd'; with images, only sensed parts are observed"
     yield camera_table(cameras_of(env.layout, env.task.cameras))
+
+
+def source_of(cls: type[MultiRobotTask]) -> str:
+    """Return which file a task follows, or whose it is; empty if that is not known."""
+    return cls.source or ("" if origin(cls.task_id) else OWN_SOURCE)
 
 
 def _parity(env: TaskEnv) -> str:

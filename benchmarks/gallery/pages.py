@@ -58,6 +58,7 @@ from tasks.description import (
     camera_table,
     observation_table,
     read_docstring,
+    source_of,
 )
 from tasks.engine.cameras import cameras_of
 from tasks.registry import CATALOGUE as TASKS
@@ -235,7 +236,9 @@ def all_pages(record: Record, folder: Path) -> dict[str, str]:
     pages = {"index.md": render("gallery_index", sections=sections, kinds=kinds, **shared)}
     for task_id, cls in classes.items():
         about = _task(cls, record["tasks"][task_id], robots, bench)
-        pages[f"tasks/{task_id}.md"] = render("gallery_task", cls=cls, **about, **shared)
+        pages[f"tasks/{task_id}.md"] = render(
+            "gallery_task", cls=cls, source=source_of(cls), **about, **shared
+        )
     for name, robot in robots.items():
         about = _robot(robot, record["robots"][name]["joints"], classes)
         pages[f"robots/{name}.md"] = render("gallery_robot", robot=robot, **about, **shared)

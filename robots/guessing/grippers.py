@@ -87,10 +87,12 @@ def find_gripper(limb: LimbJoints, tips: Fingertips, drives: Drives) -> Gripper:
     name = name_of(limb, "gripper")
     followers = _followers(limb.fingers)
     leaders = [joint for joint in limb.fingers if joint.name in followers]
-    idle = [joint for joint in leaders if not _moves_a_tip(followers[joint.name], tips)]
-    if 0 < len(idle) < len(leaders):
+    if len(leaders) > 1:
+        idle = [joint for joint in leaders if not _moves_a_tip(followers[joint.name], tips)]
         moving = [joint for joint in leaders if joint not in idle]
-        return _with_idle(name, idle, _driven(limb, name, moving, followers, tips, drives), drives)
+        if idle and moving:
+            driven = _driven(limb, name, moving, followers, tips, drives)
+            return _with_idle(name, idle, driven, drives)
     return _driven(limb, name, leaders, followers, tips, drives)
 
 

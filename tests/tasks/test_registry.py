@@ -12,7 +12,7 @@ import tasks
 from layouts import single
 from robot_layouts.simulation import Friction, PhysicsSettings, State, World
 from robot_layouts.simulation.sapien3.backend import worlds_below
-from robots import TaskError, UnknownNameError
+from robots import UnknownNameError
 from tasks.engine.scenario import ScenarioFields
 from tasks.registry import TASKS
 
@@ -64,12 +64,10 @@ def test_an_unknown_field_raises():
         tasks.make("PickCube-v1", num_environments=3)
 
 
-def test_one_place_takes_a_bare_name_and_two_do_not():
-    assert tasks.make("PickCube-v1", robots="panda_wristcam").layout["arm"].robot.name == (
-        "panda_wristcam"
-    )
-    with pytest.raises(TaskError, match=r"the places are \['left', 'right'\]"):
-        tasks.make("TwoRobotPickCube-v1", robots="panda")
+def test_all_places_take_a_bare_name():
+    for task in ("PickCube-v1", "TwoRobotPickCube-v1"):
+        placed = tasks.make(task, robots="panda_wristcam").layout.values()
+        assert {placement.robot.name for placement in placed} == {"panda_wristcam"}
     with pytest.raises(UnknownNameError, match="robot of this layout 'middle'"):
         tasks.make("TwoRobotPickCube-v1", robots={"middle": "panda"})
     with pytest.raises(UnknownNameError, match="Did you mean 'panda'"):
