@@ -82,7 +82,6 @@ def faults() -> Iterator[Fault]:
         yield Fault(AREA, f"make: task {task_id!r}", partial(_make, {"task_id": task_id}))
     mounted = {"sensor_configs": {"mount": ("arm", "palm")}, "obs_mode": "rgb"}
     yield Fault(AREA, "make: a camera on a link that is not there", partial(_make, mounted))
-    yield Fault(AREA, "make: two robots without places", _make_two)
     for name, values in WRONG_CAMERA.items():
         for value in values:
             yield Fault(AREA, f"Camera({_call(name, value)})", partial(_camera, name, value))
@@ -97,10 +96,6 @@ def _call(name: str, value: Any) -> str:
 
 def _make(arguments: dict[str, Any], folder: Path) -> None:
     tasks.make(**{"task_id": TASK, **arguments}).close()
-
-
-def _make_two(folder: Path) -> None:
-    tasks.make("TwoRobotPickCube-v1", robots="panda").close()
 
 
 def _camera(name: str, value: Any, folder: Path) -> None:
