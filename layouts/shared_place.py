@@ -68,7 +68,9 @@ def shared_place(
     reach = min(layout.arm(place).robot.reach for place in places)
     cell = _CELL * reach
     reached = [_near_ground(layout, place, height * reach, table) for place in places]
-    everywhere = np.concatenate(reached) if all(map(len, reached)) else np.zeros((1, 2))
+    if not all(map(len, reached)):  # a hand without an arm reaches no ground
+        return None
+    everywhere = np.concatenate(reached)
     low, high = everywhere.min(axis=0) - 2 * cell, everywhere.max(axis=0) + 2 * cell
     counts = np.ceil((high - low) / cell).astype(int)
     shared = np.ones(counts, bool)

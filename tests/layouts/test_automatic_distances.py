@@ -14,6 +14,7 @@ from robots import LayoutError, RobotDescriptor, RobotRegistry
 from tasks.originals.relay import find_zones
 from tests.layouts import small_robots
 from tests.quick import quick_cases
+from tests.robots.urdf_parts import Parts
 
 CLEAR = 0.05  # m, at the keyframes with joint noise
 
@@ -154,6 +155,14 @@ def test_at_a_task_a_robot_stands_on_its_wheels(tmp_path):
     layout = at_task({"left": on_a_wheel(tmp_path, 0.03)}, task)
     assert layout["left"].base_position[2] == pytest.approx(0.0205, abs=6e-4)
     assert layout["right"] == task["right"]
+
+
+def test_a_hand_without_an_arm_stands_beside_one_that_reaches_the_ground(tmp_path):
+    parts = Parts()
+    parts.jaws(parts.link("base_link", 5.0, "0.1 0.1 0.1", "0 0 0.05"), "a")
+    hand = RobotDescriptor.from_urdf(parts.write(tmp_path))
+    assert hand.fingers is not None
+    assert side_by_side({"hand": hand, "arm": "panda"}, spacing="auto").validate().ok
 
 
 @pytest.mark.long
