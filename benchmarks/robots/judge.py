@@ -230,14 +230,16 @@ def _work(seen: Seen, expected: Expected) -> dict[str, Answer]:
     held = sum(one["grasps"] for one in known)
     handed = seen.get("hand_over", {})
     text = f"{handed['solved']} of {handed['of']}" if "of" in handed else ""
-    passed = _yes(handed.get("solved", 0) >= HANDED_OVER, text) if known else NOT_ASKED
+    passed = _yes(handed.get("solved", 0) >= HANDED_OVER, text)
+    groups = seen.get("loads", {}).get("groups", ())
+    arms = known if any("arm" in name.split("_") for name in groups) else ()  # not of hands alone
     return {
         "fingers": _yes(len(known) == count, f"{len(known)} of {count}") if count else NOT_ASKED,
         "between": _yes(off < TIPS, length) if known else NOT_ASKED,
         "grasps": _yes(held == count, f"{held} of {count}") if count else NOT_ASKED,
         "square": _square(seen.get("tcp_control", {}), expected),
-        "hand_over": passed if len(known) == 1 else NOT_ASKED,
-        "two_hands": passed if len(known) > 1 else NOT_ASKED,
+        "hand_over": passed if len(arms) == 1 else NOT_ASKED,
+        "two_hands": passed if len(arms) > 1 else NOT_ASKED,
     }
 
 
