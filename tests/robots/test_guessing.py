@@ -169,6 +169,9 @@ class TestLimbs:
         parts.arm("column", "a", "0 0 0.1")
         found = guess(parts, tmp_path)
         assert found.descriptor.no_floor_contact == ("column",)
+        assert {"arm", "arm_slide"} <= joints_of(found).keys()  # and the arm alone moves the TCP
+        moved = found.descriptor.in_control_mode("pd_ee_delta_pose").action_split.groups
+        assert [name for name, group in moved.items() if group.asks.tcp] == ["arm"]
         assert any("column, below the ground that its base" in r for r in found.reasons)
         assert not try_robot(found.descriptor, 5).overlaps
 
