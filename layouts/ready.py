@@ -14,6 +14,7 @@ from layouts.placement import LARGEST_NOISE, Placement
 from layouts.shared_place import (
     are_clear,
     body_corners,
+    body_joints,
     drawn_postures,
     inside_table,
     places_and_approaches,
@@ -216,12 +217,13 @@ def _postures(placement: Placement, limb: str, target: Floats) -> Floats:
     arm = robot.parts[limb] if limb else robot
     columns = [robot.joints.index(joint) for joint in arm.arm_joints]
     base = pose_matrix(placement.base_position, placement.base_quaternion)
-    places, approaches = places_and_approaches(robot, arm)
+    body = body_joints(placement, arm)
+    places, approaches = places_and_approaches(robot, arm, body)
     away = np.linalg.norm(transform(base, places) - target, axis=1)
     away += DOWN * arm.reach * (approaches @ base[2, :3])
     nearest = np.argsort(away)[:STARTS]
     qpos = np.tile(placement.start_qpos, (STARTS, 1))
-    qpos[:, columns] = drawn_postures(robot, arm)[nearest][:, columns]
+    qpos[:, columns] = drawn_postures(robot, arm, body)[nearest][:, columns]
     tcp, frame = find_tcp(arm, tree), gripper_frame(arm)
     turns = base[:3, :3] @ tree.forward(qpos)[:, tcp.turned, :3, :3] @ frame
     goal = IkGoal(

@@ -1,7 +1,7 @@
-"""A policy server as openpi has it, in a process of its own: its protocol, and msgpack's own code.
+"""Policy servers as openpi and vla-eval have them, in processes of their own, by msgpack itself.
 
-``python -m tests.data.policy_server MODULE:NAME`` prints its port. What it serves is called with
-each observation, and returns the answer.
+``python -m tests.data.policy_server MODULE:NAME [vla-eval]`` prints its port. What it serves is
+called with each observation, and returns the answer.
 """
 
 import os
@@ -9,7 +9,7 @@ import subprocess
 import sys
 import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -60,12 +60,56 @@ def answer_all(connection: ServerConnection, policy: Any) -> None:
             return
 
 
+def with_texts(message: Any) -> Any:
+    """Return a message whose arrays are as vla-eval has them, ready for `pack`."""
+    if isinstance(message, dict):
+        return {key: with_texts(part) for key, part in message.items()}
+    if not isinstance(message, np.ndarray):
+        return message
+    about = {"dtype": message.dtype.str, "shape": list(message.shape)}
+    return {"__ndarray__": True, "data": message.tobytes(), **about}
+
+
+def from_texts(data: bytes) -> Any:
+    """Return the message that bytes of vla-eval's hold."""
+
+    def decoded(found: dict[Any, Any]) -> Any:
+        if "__ndarray__" in found:
+            return np.frombuffer(found["data"], found["dtype"]).reshape(found["shape"])
+        return found
+
+    return msgpack.unpackb(data, object_hook=decoded)
+
+
+def answer_sessions(connection: ServerConnection, policy: Any) -> None:
+    """Serve one client as vla-eval does: hello, a task, then an answer to each observation."""
+    begun = False
+    with suppress(ConnectionClosed):
+        while True:
+            message = from_texts(connection.recv())
+            kind, payload = message["type"], message["payload"]
+            assert isinstance(message["timestamp"], float)
+            if kind == "episode_start":
+                begun = payload["task"]["suite"] == "robot-layouts"
+                continue
+            if kind == "hello":
+                assert payload["protocol_version"] == 1
+                answer = {"type": "hello", "payload": {"model_server": "Test"}}
+            else:
+                assert (kind, begun) == ("observation", True)
+                answer = {"type": "action", "payload": policy(payload)}
+            connection.send(pack(with_texts({**answer, "seq": message["seq"], "timestamp": 0.0})))
+
+
+PROTOCOLS = {"openpi": answer_all, "vla-eval": answer_sessions}
+
+
 @contextmanager
-def server(policy: str) -> Iterator[str]:
+def server(policy: str, protocol: str = "openpi") -> Iterator[str]:
     """Serve ``MODULE:NAME`` in another process, and yield its address."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.data.policy_server", policy],
+        [sys.executable, "-m", "tests.data.policy_server", policy, protocol],
         stdout=subprocess.PIPE,
         text=True,
         env=environment,
@@ -73,18 +117,19 @@ def server(policy: str) -> Iterator[str]:
     )
     try:
         assert process.stdout is not None
-        yield f"ws://127.0.0.1:{int(process.stdout.readline())}"
+        scheme = "ws" if protocol == "openpi" else f"{protocol}+ws"
+        yield f"{scheme}://127.0.0.1:{int(process.stdout.readline())}"
     finally:
         process.kill()
         process.communicate()
 
 
-def main(name: str) -> None:
+def main(name: str, protocol: str) -> None:
     module, _, attribute = name.partition(":")
     policy = getattr(import_module(module), attribute)
 
     def answer(connection: ServerConnection) -> None:
-        answer_all(connection, policy() if isinstance(policy, type) else policy)
+        PROTOCOLS[protocol](connection, policy() if isinstance(policy, type) else policy)
 
     with serve(answer, "127.0.0.1", 0, compression=None, max_size=None) as listening:
         print(listening.socket.getsockname()[1], flush=True)
@@ -92,4 +137,4 @@ def main(name: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

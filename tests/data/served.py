@@ -30,6 +30,22 @@ class Chunks:
         return {"actions": np.full((6, ACTIONS), self.asked / 100, np.float32)}
 
 
+class Session:
+    """One action after the other, which says how often this session was asked, and sees joints."""
+
+    def __init__(self):
+        self.asked = 0
+
+    def __call__(self, observation):
+        assert observation["task_description"].endswith(".")
+        self.asked += 1
+        return {"actions": session_action(observation["state"], self.asked)}
+
+
+def session_action(joints, asked):
+    return (np.tanh(joints) / asked).astype(np.float32)
+
+
 class Replays:
     """Carries out what is recorded where the observation is the recorded one, to the last bit."""
 

@@ -11,17 +11,19 @@ import tasks
 from robot_layouts.__main__ import main
 from robot_layouts.data import evaluate, record
 from robot_layouts.data.playing.served.client import pack, unpack
-from robot_layouts.data.playing.served.keys import PRESETS, Keys, load_keys
+from robot_layouts.data.playing.served.keys import PRESETS, Keys, load_keys, vla_eval
 from robot_layouts.data.playing.served.policy import ServedPolicy
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.receipts import Receipt, ReceiptError, verify
+from robot_layouts.simulation.rendering import vulkan_problem
 from robots import TaskError, UnknownNameError
 from tasks.description import instruction_of
 from tests.data import policy_server
 from tests.data.policy_server import server
-from tests.data.served import ACTIONS, TASK, Replays, leans
+from tests.data.served import ACTIONS, TASK, Replays, leans, session_action
 
 SHORT = {"max_episode_steps": 10}
+WRISTS = {"left": "panda_wristcam", "right": "panda_wristcam"}
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +65,45 @@ def test_a_served_policy_scores_as_it_does_here(leaning):
     assert said is not None
     assert 0 < float(said[1]) <= float(said[2])
     assert served.policy == leaning
+
+
+class SessionHere:
+    """What `tests.data.served.Session` does, without a server."""
+
+    def __init__(self):
+        self.asked = 0
+
+    def __call__(self, obs):
+        self.asked += 1
+        return session_action(obs["agent"]["qpos"][0].numpy(), self.asked)
+
+
+def test_each_episode_is_a_session_of_a_model_server_of_vla_eval():
+    """Also of episodes that are played at once, whose questions take turns."""
+    making = {"workers": 0, "obs_mode": "state_dict", **SHORT}
+    here = evaluate(SessionHere(), TASK, range(3), **making)
+    assert len(set(here.returns.values())) == 3
+    with server("tests.data.served:Session", "vla-eval") as address:
+        for together in (1, 2):
+            served = evaluate(address, TASK, range(3), num_envs=together, **making)
+            assert served.scores == here.scores
+        assert served.policy == address
+        assert len(served.waits) == 30
+
+
+def test_pictures_go_to_a_model_server_of_vla_eval_by_camera():
+    with closing(tasks.make("TwoRobotPickCube-v1", obs_mode="state_dict", robots=WRISTS)) as env:
+        assert [*vla_eval(env)["observation"]] == ["state", "task_description"]
+    if vulkan_problem() is not None:
+        pytest.skip(vulkan_problem())
+    making = {"obs_mode": "rgb", "camera_size": (32, 24), "robots": WRISTS}
+    with closing(tasks.make("TwoRobotPickCube-v1", **making)) as env:
+        obs, _ = env.reset(seed=0)
+        sent = Keys(vla_eval(env), env).sent(obs, 0)
+        assert [*sent["images"]] == [*env.observer.cameras]
+        for name, picture in sent["images"].items():
+            assert np.array_equal(picture, obs["sensor_data"][name]["rgb"][0])
+        assert sent["state"].shape == (16,)
 
 
 @pytest.mark.long
@@ -234,8 +275,9 @@ def test_the_instruction_is_the_one_of_the_seed(tmp_path, monkeypatch, seed):
 @pytest.mark.parametrize(
     ("address", "error", "message"),
     [
-        ("ws://", TaskError, "the policy's address is 'ws://'; it must be ws://HOST:PORT or wss"),
-        ("http://host:80", TaskError, "'http://host:80'; it must be ws://HOST:PORT or wss://HOST"),
+        ("ws://", TaskError, "the policy's address is 'ws://'; it must be ws://HOST:PORT, wss"),
+        ("http://host:80", TaskError, "'http://host:80'; it must be ws://HOST:PORT, wss://HOST"),
+        ("vla-eval://host:80", TaskError, "or vla-eval+ws://HOST:PORT"),
         ("ws://host:80#alhoa", TaskError, "Did you mean 'aloha'"),
         ("ws://host:80#none.yaml", TaskError, "cannot read the keys 'none.yaml'"),
     ],

@@ -22,7 +22,7 @@ from websockets.utils import accept_key
 from robot_layouts.data import evaluate, record
 from robot_layouts.data.playing.served import client as asking
 from robots import RobotLayoutsError
-from tests.data.policy_server import pack, unpack
+from tests.data.policy_server import from_texts, pack, unpack, with_texts
 from tests.faults.fault import GOES_ON, Fault, run_command
 
 AREA = "policy servers"
@@ -105,6 +105,8 @@ def faults() -> Iterator[Fault]:
         yield Fault(AREA, what, partial(_refused, behaviour))
     for what, said in RAW.items():
         yield Fault(AREA, what, partial(_no_websocket, said))
+    for what, message in SESSION_ANSWERS.items():
+        yield Fault(AREA, f"a model server of vla-eval sends {what}", partial(_session, message))
     yield Fault(AREA, "it reads nothing", _reads_nothing)
     yield Fault(AREA, "a command meets NaN", _command)
     yield Fault(AREA, "nothing listens at its port", _nobody)
@@ -113,6 +115,21 @@ def faults() -> Iterator[Fault]:
     yield Fault(AREA, "it restarts in the middle of an episode", _restarts, GOES_ON)
     yield Fault(AREA, "a recording goes on once it answers again", _goes_on, GOES_ON)
 
+
+SESSION_ANSWERS: dict[str, dict[str, Any]] = {
+    "an error": {"type": "error", "payload": {"error": "observation_failed: no such image"}},
+    "a message of another kind": {"type": "hello", "payload": {}},
+    "a message without a kind": {"payload": GOOD},
+    "an answer that is a list": {"type": "action", "payload": [GOOD["actions"]]},
+    "an answer without actions": {"type": "action", "payload": {}},
+    "an answer of too few numbers": {
+        "type": "action",
+        "payload": {"actions": np.zeros(ACTIONS - 1, np.float32)},
+    },
+    "an answer with NaN": {"type": "action", "payload": _with(math.nan)},
+    "an answer to another question": {"type": "action", "payload": GOOD, "seq": 1},
+    "an answer that nothing numbers": {"type": "action", "payload": GOOD, "seq": None},
+}
 
 METADATA: dict[str, Any] = {
     "a number": 5,
@@ -253,6 +270,20 @@ def _named(address: str, folder: Path) -> None:
     assert address in str(caught.value)
     assert len(str(caught.value)) < 1000
     raise caught.value
+
+
+def _session(message: dict[str, Any], folder: Path) -> None:
+    """Greet as vla-eval's model servers do, and answer an observation with a message."""
+
+    def behave(client: ServerConnection) -> None:
+        for data in client:
+            asked = from_texts(data)
+            answers = {"hello": {"type": "hello", "payload": {}}, "observation": message}
+            if (answer := answers.get(asked["type"])) is not None:
+                client.send(pack(with_texts({"seq": asked["seq"], **answer})))
+
+    with server(behave) as address:
+        _named(f"vla-eval+{address}", folder)
 
 
 def _not_recorded(behave: Behaviour, folder: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement, around_table, at_task, face_to_face, ring, single
+from layouts.ready import drawn_back
 from layouts.shared_place import SHARES_DOWN, working_reaches
 from robots import AssetError, LayoutError, RobotRegistry, UnknownNameError
 from robots.assets.locator import UrdfLocator
@@ -81,6 +82,13 @@ def test_arms_that_would_start_inside_each_other_draw_their_hands_back():
     assert abs(complex(*placed["a"].base_position[:2])) == pytest.approx(0.75 * share, abs=1e-3)
     assert placed["a"].qpos is not None
     assert not [f for f in placed.validate(workspaces=False).findings if f.serious]
+
+
+def test_an_arm_on_a_torso_draws_its_hand_back():
+    drawn = drawn_back(single({"arm": "fetch"})["arm"], (1.5, 0.0))
+    assert drawn.qpos is not None
+    report = Layout({"arm": drawn}).validate(workspaces=False)
+    assert not [f for f in report.findings if f.serious and f.kind == "collision"]
 
 
 def test_how_far_robots_of_tasks_reach_down_is_as_their_files_say(monkeypatch):

@@ -11,10 +11,9 @@ from vla_eval.specs import IMAGE_RGB, LANGUAGE, DimSpec
 from vla_eval.types import Action, EpisodeResult, Observation, Task
 
 import tasks as our_tasks
-from robot_layouts.data.playing.served.keys import Keys
+from robot_layouts.data.playing.served.keys import Keys, vla_eval
 from robots import TaskError
 from tasks import TaskEnv
-from tasks.description import instruction_of
 from tasks.interfaces.gymnasium import info_row
 from tasks.language.stages import STAGE_SCORE
 
@@ -98,12 +97,7 @@ class RobotLayouts(StepBenchmark):
     def make_obs(self, raw_obs: Any, task: Task) -> Observation:
         """Return pictures by camera, joint positions, and what is to be done."""
         assert self._keys is not None, "no episode has begun"
-        seen = raw_obs.get("sensor_data", {})
-        return {
-            "images": {name: each["rgb"][0].numpy(force=True) for name, each in seen.items()},
-            "task_description": instruction_of(self._classes[task["name"]], self._seed),
-            _STATE: self._keys.sent(raw_obs, self._seed)[_STATE],
-        }
+        return self._keys.sent(raw_obs, self._seed)
 
     def get_step_result(self, step_result: StepResult) -> EpisodeResult:
         """Return whether the last step was a success, and how far the episode came in stages."""
@@ -147,7 +141,7 @@ class RobotLayouts(StepBenchmark):
             self.cleanup()
             env = our_tasks.make(self._names[name], **self._making)
             self._env = env
-            self._keys = Keys({"observation": {_STATE: {"joints": list(env.layout)}}}, env)
+            self._keys = Keys(vla_eval(env), env)
         return self._env
 
     def _frame(self, obs: Any) -> Any:

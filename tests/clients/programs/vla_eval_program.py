@@ -2,13 +2,17 @@
 
 import sys
 from pathlib import Path
+from queue import Queue
+from threading import Thread
 
 sys.path.append(str(Path(__file__).parents[3] / "integrations/vla_eval_robot_layouts"))
 
+import anyio
 import numpy as np
 import pytest
 import vla_eval
 from vla_eval.model_servers.predict import PredictModelServer
+from vla_eval.model_servers.serve import serve_async
 from vla_eval.recording import NullEpisodeRecorder
 from vla_eval.specs import DimSpec
 from vla_eval_robot_layouts import RobotLayouts
@@ -111,6 +115,43 @@ def episodes_are_ours():
     assert server.seen[0]["task_description"].endswith(".")
 
 
+class Pulls(PredictModelServer):
+    """Chunks of four actions, of joints where each chunk begins."""
+
+    def predict(self, obs, ctx):
+        return {"actions": pulls(obs["state"])}
+
+
+def pulls(joints):
+    return np.tile(-np.tanh(joints), (4, 1)).astype(np.float32)
+
+
+class PullsHere:
+    def __init__(self):
+        self.ahead = []
+
+    def __call__(self, obs):
+        if not self.ahead:
+            self.ahead = [*pulls(obs["agent"]["qpos"][0].numpy())]
+        return self.ahead.pop(0)
+
+
+def model_servers_act_as_policies_do_here():
+    ports = Queue()
+
+    async def serve():
+        async with anyio.create_task_group() as group:
+            ports.put(await group.start(serve_async, Pulls(chunk_size=4), "127.0.0.1", 0))
+
+    Thread(target=anyio.run, args=(serve,), daemon=True).start()
+    address = f"vla-eval+ws://127.0.0.1:{ports.get()}"
+    making = {"workers": 0, "obs_mode": "state_dict", "max_episode_steps": 10}
+    here = evaluate(PullsHere(), "PushT-v1", range(3), **making)
+    for together in (1, 2):
+        served = evaluate(address, "PushT-v1", range(3), num_envs=together, **making)
+        assert served.scores == here.scores
+
+
 def driven(name):
     """Return how many numbers the joint actions of a task have."""
     cls = tasks.get_task_class(name)
@@ -140,5 +181,6 @@ def what_is_wrong_is_said():
 if __name__ == "__main__":
     what_is_wrong_is_said()
     episodes_are_ours()
+    model_servers_act_as_policies_do_here()
     if vulkan_problem() is None:
         pictures_are_seen()

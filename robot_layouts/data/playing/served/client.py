@@ -1,7 +1,8 @@
 """Asks a policy server for actions: its messages, the connection, and chunks of actions.
 
-Messages are as openpi has them: msgpack, in which an array is a map whose keys are bytes. Source:
-the package openpi-client 0.1.2, ``msgpack_numpy`` and ``websocket_client_policy``.
+Messages are msgpack. In openpi's, an array is a map whose keys are bytes (source: the package
+openpi-client 0.1.2, ``msgpack_numpy`` and ``websocket_client_policy``); in vla-eval's, the keys are
+texts (the package vla-eval 0.8.0, ``protocol`` and ``connection``).
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 import socket
 import struct
 from contextlib import suppress
-from time import perf_counter, sleep
+from time import perf_counter, sleep, time
 from typing import Any, cast
 
 import msgspec
@@ -29,6 +30,10 @@ MOST_BYTES = 2**26  # of a message: a chunk of actions takes some kilobytes
 OPENING_SECONDS = 10.0
 _SHOWN = 300  # characters of a text that a server sent
 _ARRAY, _NUMBER = b"__ndarray__", b"__npgeneric__"
+_HELLO, _START, _OBSERVATION, _ACTION, _ERROR = (
+    *("hello", "episode_start", "observation", "action", "error"),
+)  # messages of vla-eval's
+_VLA_EVAL_PROTOCOL = 1
 _KINDS = "biuf"  # of NumPy's types: flags and numbers
 
 
@@ -64,21 +69,26 @@ class Connection:
         self._errors = optional("websockets.exceptions", what, "served")
         self._socket: Any = None
 
+    def episode(self) -> Connection:
+        """Return what asks during another episode, which may go on beside this one."""
+        return self
+
     def ask(self, observation: dict[str, Any]) -> tuple[dict[Any, Any], float]:
         """Return the answer to an observation, and how long that took (s).
 
         Raises:
             PolicyServerError: If there is none, or it is no mapping.
         """
-        message, began, reason = pack(observation), perf_counter(), ""
+        began, reason = perf_counter(), ""
         for attempt in range(ATTEMPTS):
             if attempt:
                 sleep(PAUSE)
             try:
                 if self._socket is None:
                     self._open()
-                self._send(message)
-                return self._mapping("an answer"), perf_counter() - began
+                    self._greet()
+                self._expect_silence()
+                return self._answer(observation), perf_counter() - began
             except self._errors.ConnectionClosed as error:
                 self.close()
                 reason = self._reason(error)
@@ -117,14 +127,20 @@ class Connection:
         # Else what is sent to a server that reads nothing would wait for ever.
         limit = struct.pack("ll", int(self._seconds), int(self._seconds % 1 * 1e6))
         self._socket.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
+
+    def _greet(self) -> None:
+        """Do what comes before the first question over a connection."""
         self._mapping("its metadata")
 
-    def _send(self, message: bytes) -> None:
-        """Send what is asked, unless a message waits that was not asked for, and would answer."""
+    def _expect_silence(self) -> None:
+        """Refuse a message that was not asked for, and would be taken for an answer."""
         with suppress(TimeoutError):
             self._socket.recv(timeout=0)
             raise self._error("sent a message that was not asked for")
-        self._socket.send(message)
+
+    def _answer(self, observation: dict[str, Any]) -> dict[Any, Any]:
+        self._socket.send(pack(observation))
+        return self._mapping("an answer")
 
     def _mapping(self, what: str) -> dict[Any, Any]:
         try:
@@ -147,10 +163,73 @@ class Connection:
         return PolicyServerError(f"the policy server {self.name} {what}")
 
 
+class VlaEvalConnection(Connection):
+    """Asks one of vla-eval's model servers, which is told when an episode begins.
+
+    A connection is a session there, with a chunk of actions of its own, so that each episode takes
+    another one. Where it is lost, the episode begins anew over the next one.
+    """
+
+    _asked = 0
+
+    def __init__(self, address: str, name: str, seconds: float, task: str) -> None:
+        """Keep where the server is; see `Connection`.
+
+        Args:
+            address: Likewise.
+            name: Likewise.
+            seconds: Likewise.
+            task: Id of the task, which the server is told.
+        """
+        super().__init__(address, name, seconds)
+        self._task = task
+        self._copied = address, name, seconds, task
+
+    def __del__(self) -> None:
+        """Close the connection."""
+        with suppress(Exception):  # at the end of the process
+            self.close()
+
+    def episode(self) -> VlaEvalConnection:
+        """Return what asks during another episode."""
+        return VlaEvalConnection(*self._copied)
+
+    def _greet(self) -> None:
+        self._tell(_HELLO, {"harness_version": "", "protocol_version": _VLA_EVAL_PROTOCOL})
+        self._told(_HELLO)
+        self._tell(_START, {"task": {"name": self._task, "suite": "robot-layouts"}})
+
+    def _answer(self, observation: dict[str, Any]) -> dict[Any, Any]:
+        self._tell(_OBSERVATION, observation)
+        answer = self._told(_ACTION)
+        named = {key: part for key, part in answer.items() if isinstance(part, np.ndarray)}
+        return {**answer, **{key: np.atleast_2d(part) for key, part in named.items()}}
+
+    def _tell(self, kind: str, payload: dict[str, Any]) -> None:
+        self._asked += 1
+        message = {"type": kind, "payload": payload, "seq": self._asked, "timestamp": time()}
+        self._socket.send(msgspec.msgpack.encode(message, enc_hook=_encoded_with_texts))
+
+    def _told(self, kind: str) -> dict[Any, Any]:
+        """Return what the server says in a message of a kind."""
+        message = self._mapping(f"a message of the kind {kind!r}")
+        payload, found = message.get("payload"), message.get("type")
+        if found == _ERROR:
+            said = payload.get("error") if isinstance(payload, dict) else payload
+            raise self._error(f"says: {cut(str(said), _SHOWN)}")
+        if found != kind or not isinstance(payload, dict):
+            raise self._error(f"sent {shown(message)}, not a message of the kind {kind!r}")
+        if message.get("seq") != self._asked:
+            raise self._error(
+                f"answered message {shown(message.get('seq'))}, not {self._asked}, the last one"
+            )
+        return cast("dict[Any, Any]", payload)
+
+
 class PolicyClient:
     """Asks a policy server for a chunk of actions, carries it out, and asks for the next.
 
-    A copy begins a new episode, and asks over the same connection.
+    A copy begins a new episode.
 
     Attributes:
         waits: How long each answer took (s).
@@ -174,7 +253,7 @@ class PolicyClient:
 
     def episode(self, seed: int) -> PolicyClient:
         """Return what plays the episode of a seed."""
-        return PolicyClient(self._keys, self._connection, seed)
+        return PolicyClient(self._keys, self._connection.episode(), seed)
 
     def __call__(self, observation: Any) -> NDArray[np.float32]:
         """Return the action for an observation of one environment, (A,).
@@ -249,6 +328,10 @@ def _encoded(value: Any) -> Any:
     }
 
 
+def _encoded_with_texts(value: Any) -> Any:
+    return {key.decode(): part for key, part in _encoded(value).items()}
+
+
 def _decoded(value: Any) -> Any:
     if isinstance(value, list):
         return [_decoded(part) for part in cast("list[Any]", value)]
@@ -257,6 +340,8 @@ def _decoded(value: Any) -> Any:
     named = cast("dict[Any, Any]", value)
     if _ARRAY in named:
         return _array(named.get(b"data"), named.get(b"dtype"), named.get(b"shape"))
+    if _ARRAY.decode() in named:
+        return _array(named.get("data"), named.get("dtype"), named.get("shape"))
     if _NUMBER in named:
         return named.get(b"data")
     return {key: _decoded(part) for key, part in named.items()}

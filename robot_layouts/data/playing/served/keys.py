@@ -174,7 +174,29 @@ def aloha(task: TaskEnv) -> dict[str, Any]:
     }
 
 
+def vla_eval(task: TaskEnv) -> dict[str, Any]:
+    """Return the keys that vla-eval recommends to benchmarks, for any task.
+
+    Source: the package vla-eval 0.8.0, ``types``.
+    """
+    pictures = {name: {"camera": name} for name in _coloured(task)}
+    return {
+        "observation": {
+            **({"images": pictures} if pictures else {}),
+            "state": {"joints": [*task.layout]},
+            "task_description": {"text": "instruction"},
+        }
+    }
+
+
 PRESETS = {"aloha": aloha, "droid": droid}
+
+
+def _coloured(task: TaskEnv) -> list[str]:
+    """Return the names of the cameras whose colours are observed."""
+    space: Any = task.single_observation_space
+    paths = [path.lstrip("/").split("/") for path in _paths(space)]
+    return [path[1] for path in paths if path[0] == "sensor_data" and path[-1] == "rgb"]
 
 
 def _cameras(task: TaskEnv) -> tuple[list[str], dict[str, list[str]]]:

@@ -9,13 +9,14 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robot_layouts.data.actors import POLICY, Actor
-from robot_layouts.data.playing.served.client import Connection, PolicyClient
-from robot_layouts.data.playing.served.keys import PRESETS, Keys, load_keys
+from robot_layouts.data.playing.served.client import Connection, PolicyClient, VlaEvalConnection
+from robot_layouts.data.playing.served.keys import PRESETS, Keys, load_keys, vla_eval
 from robot_layouts.data.reading.json_files import sized_file
 from robots import TaskError, unknown_name_message
 from tasks import TaskEnv
 
-_SCHEMES = "ws", "wss"
+_VLA_EVAL = "vla-eval+"  # before the address of a server that speaks vla-eval's protocol
+_SCHEMES = ("ws", "wss", f"{_VLA_EVAL}ws", f"{_VLA_EVAL}wss")
 
 
 def is_address(name: str) -> bool:
@@ -25,12 +26,14 @@ def is_address(name: str) -> bool:
 
 @dataclass(frozen=True)
 class ServedPolicy:
-    """A policy that another process serves by openpi's protocol; nothing is connected yet.
+    """A policy that another process serves; nothing is connected yet.
 
     Attributes:
-        address: ``ws://HOST:PORT`` or ``wss://HOST:PORT``, and after ``#`` which keys the server
-            knows: ``aloha``, ``droid`` or a YAML file; see `load_keys`. Without, it is sent
-            everything that is observed.
+        address: ``ws://HOST:PORT`` or ``wss://HOST:PORT`` of a server that speaks openpi's
+            protocol, ``vla-eval+ws://HOST:PORT`` or ``vla-eval+wss://HOST:PORT`` of one of
+            vla-eval's model servers. After ``#`` comes which keys the server knows: ``aloha``,
+            ``droid`` or a YAML file; see `load_keys`. Without, openpi's is sent everything that is
+            observed, and vla-eval's what `vla_eval` returns.
         name: The address without what may be secret.
         file: The file of keys, or None.
         keys: What that holds.
@@ -55,8 +58,9 @@ class ServedPolicy:
             parts = urlsplit("")
         if not sound:
             raise TaskError(
-                f"the policy's address is {self.address!r}; it must be ws://HOST:PORT or"
-                " wss://HOST:PORT, and after # the keys that the server knows"
+                f"the policy's address is {self.address!r}; it must be ws://HOST:PORT,"
+                f" wss://HOST:PORT or {_VLA_EVAL}ws://HOST:PORT, and after # the keys that the"
+                " server knows"
             )
         host = parts.netloc.rpartition("@")[2]
         shown = f"{parts.scheme}://{host}{parts.path}"
@@ -88,6 +92,10 @@ class ServedPolicy:
             MissingPackageError: If websockets is not installed.
         """
         data = PRESETS[self.keys](task) if isinstance(self.keys, str) else self.keys
-        keys = Keys(data, task)
         address = self.address.partition("#")[0]
-        return PolicyClient(keys, Connection(address, self.name, keys.seconds))
+        if not address.startswith(_VLA_EVAL):
+            keys = Keys(data, task)
+            return PolicyClient(keys, Connection(address, self.name, keys.seconds))
+        keys = Keys(data or vla_eval(task), task)
+        address = address.removeprefix(_VLA_EVAL)
+        return PolicyClient(keys, VlaEvalConnection(address, self.name, keys.seconds, task.task_id))
