@@ -28,6 +28,7 @@ from benchmarks.records import (
     write_page,
     write_record,
 )
+from benchmarks.skills import robot_of
 from layouts import Layout, face_to_face, ring, search
 from layouts.frames import Frame
 from robot_layouts.experts import find_expert
@@ -117,8 +118,12 @@ CELLS = {
 TASKS = (*CELLS, "Relay-v1")
 
 HAND_OVER = "TwoRobotHandOver-v1"
-HANDS = ("panda", "so100", "so101", "z1", "fetch")
+HANDS = (
+    *("panda", "so100", "so101", "z1", "fetch"),
+    *("xarm7_with_panda", "ur3_with_panda", "ur5_with_panda", "ur10_with_panda"),
+)
 PAIRS = tuple(dict.fromkeys(pair for hand in HANDS for pair in ((hand, hand), ("panda", hand))))
+BODIES = ("baxter", "mobile_panda_dual", "pr2", "tiago_pro")
 
 
 def experts(
@@ -145,7 +150,7 @@ def experts(
     """
     torch.set_num_threads(1)
     record = read_record(out, versions={}, tasks={}, pairs={})
-    total = len(tasks) * (seeds + layouts * layout_seeds) + len(PAIRS) * pair_seeds
+    total = len(tasks) * (seeds + layouts * layout_seeds) + len((*PAIRS, *BODIES)) * pair_seeds
     with tqdm(total=total, disable=None) as bar:
         for _ in chain(
             _played(record, tasks, seeds, layouts, layout_seeds),
@@ -187,18 +192,26 @@ def _played(
 
 def _handed_over(pairs: Record, seeds: int) -> Iterator[None]:
     """Play what the record of pairs lacks, and yield after every episode."""
-    for left, right in PAIRS:
-        seen = pairs.setdefault(f"{left}, {right}", {"episodes": {}})
+    for names in (*PAIRS, *BODIES):
+        label = names if isinstance(names, str) else ", ".join(names)
+        seen = pairs.setdefault(label, {"episodes": {}})
         if len(seen["episodes"]) >= seeds or "error" in seen:
             continue
-        layout = face_to_face({"left": left, "right": right})
         try:
-            task = make(HAND_OVER, layout=layout, obs_mode="none")
+            task = _standing(names)
         except RobotLayoutsError as error:
             seen["error"] = str(error).partition("\n")[0].rstrip(":")
             yield
         else:
             yield from _play(task, seen["episodes"], seeds)
+
+
+def _standing(names: str | tuple[str, str]) -> TaskEnv:
+    """Return the hand-over by two robots face to face, or by the arms of one."""
+    if isinstance(names, str):
+        return make(HAND_OVER, robots=names, obs_mode="none")
+    layout = face_to_face(dict(zip(("left", "right"), map(robot_of, names), strict=True)))
+    return make(HAND_OVER, layout=layout, obs_mode="none")
 
 
 def _play(task: TaskEnv, episodes: Record, seeds: int) -> Iterator[None]:

@@ -111,10 +111,11 @@ def _played(begin: Begin, seeds: int) -> Iterator[tuple[int, str]]:
 
 
 @cache
-def _robot(name: str) -> RobotDescriptor:
-    if name == "ur5_with_panda":
-        return with_gripper(RobotRegistry.load("ur5"), "panda")
-    return RobotRegistry.load(name)
+def robot_of(name: str) -> RobotDescriptor:
+    """Return a robot of the catalogue, or, by ``ARM_with_HAND``, an arm with another's hand."""
+    arm, _, hand = name.partition("_with_")
+    robot = RobotRegistry.load(arm)
+    return with_gripper(robot, hand) if hand else robot
 
 
 class _Picking:
@@ -124,7 +125,7 @@ class _Picking:
         self._robot, self._name = robot, name
 
     def begin(self) -> tuple[TaskEnv, Callable[[Scene], list[Script]]]:
-        robot, thing = _robot(self._robot), ObjectRegistry.load(self._name)
+        robot, thing = robot_of(self._robot), ObjectRegistry.load(self._name)
         scale = robot.reach / REACH
         layout = Layout({"arm": Placement(robot, (-FROM_BASE * robot.reach - 0.1, 0.0, 0.0))})
         env = _task(f"Pick{self._robot}{self._name}", layout, self._name, scale, _picked)
@@ -144,7 +145,7 @@ class _Both:
         self._what, self._name = what, name
 
     def begin(self) -> tuple[TaskEnv, Callable[[Scene], list[Script]]]:
-        left, right = map(_robot, HANDS)
+        left, right = map(robot_of, HANDS)
         thing, scale = ObjectRegistry.load(self._name), min(left.reach, right.reach) / REACH
         apart = APART * (left.reach + right.reach)
         over = self._what == "hand over"

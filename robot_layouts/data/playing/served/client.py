@@ -217,8 +217,10 @@ class VlaEvalConnection(Connection):
         if found == _ERROR:
             said = payload.get("error") if isinstance(payload, dict) else payload
             raise self._error(f"says: {cut(str(said), _SHOWN)}")
-        if found != kind or not isinstance(payload, dict):
-            raise self._error(f"sent {shown(message)}, not a message of the kind {kind!r}")
+        if found != kind:
+            raise self._error(f"sent a message of the kind {shown(found)}; {kind!r} is due")
+        if not isinstance(payload, dict):
+            raise self._error(f"sent {type(payload).__name__} in a message of the kind {kind!r}")
         if message.get("seq") != self._asked:
             raise self._error(
                 f"answered message {shown(message.get('seq'))}, not {self._asked}, the last one"
