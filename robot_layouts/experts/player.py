@@ -26,8 +26,8 @@ SETTLING, LEADING = 0.1, 0.2  # rad from its goal at which an arm settles; share
 # Share of the force with which jaws that swing close, that they hold a cube with: with more it
 # slips out in time, with less as it is lifted.
 HOLDING = 0.5
-# What is pushed slides on by v² / 2µg (m): 2µg of bodies on a table (m/s²), and the share of its way
-# that a push may lack, unless it stands for so many control steps.
+# What is pushed slides on by v² / 2µg (m): 2µg of bodies on a table (m/s²), and the share of its
+# way that a push may lack, unless it stands for so many control steps.
 SLOWS, LACKING, STANDS = 2 * 0.3 * 9.81, 0.3, 3
 AGAIN, WAITING = 4, 100  # control steps after which an arm that waits looks again, and gives up
 
