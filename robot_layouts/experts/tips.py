@@ -107,13 +107,18 @@ class TipSolver:
             turns = _TURN_WORTH * (self._axes @ turned.T - axes)
             return np.concatenate([origin + turned @ tip - position, turns.ravel()])
 
+        def fits(joints: Floats) -> bool:
+            missing = np.abs(errors(joints))
+            return bool(missing[:3].max() < _PLACE and missing[3:].max() < _TURN * _TURN_WORTH)
+
         near = self._reach.solve(tip, position, start)
         begun = start if near is None else near
-        found = descend_by_differences(errors, begun, range(len(start)))
-        found = np.clip(found, self._low, self._high)
-        missing = np.abs(errors(found))
-        fits = missing[:3].max() < _PLACE and missing[3:].max() < _TURN * _TURN_WORTH
-        return found if fits else None
+        free, limits = range(len(start)), np.stack([self._low, self._high], axis=1)
+        found = descend_by_differences(errors, begun, free)
+        bounded = np.clip(found, *limits.T)
+        if not fits(bounded) and (bounded != found).any():  # the other joints make up for those
+            bounded = descend_by_differences(errors, bounded, free, limits)
+        return bounded if fits(bounded) else None
 
 
 class TurnedSolver:
