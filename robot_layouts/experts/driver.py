@@ -73,15 +73,17 @@ class ArmDriver:
     @property
     def quickness(self) -> float:
         """How fast an arm sets off towards where it is driven, as its slowest joint does (1/s)."""
-        arms = [group for name, group in self._groups.items() if not is_gripper(name)]
-        rates = [
-            np.atleast_1d(
-                self._gain(group) * group.stiffness / np.maximum(group.damping, _LEAST_DAMPING)
-            )
-            for group in arms
-            if group.size
-        ]
-        return PEAK * float(np.concatenate(rates).min())
+        rates = {
+            joint: rate
+            for group in self._groups.values()
+            for joint, rate in zip(group.joints, self._rates(group), strict=True)
+        }
+        return PEAK * max(min(rates[joint] for joint in self._arm_joints), _LEAST_DAMPING)
+
+    def _rates(self, group: JointGroup) -> Floats:
+        """Return how fast each joint's drive sets off, (joints,) (rad/s per rad still to go)."""
+        damping = np.maximum(group.damping, _LEAST_DAMPING)
+        return np.broadcast_to(self._gain(group) * group.stiffness / damping, len(group.joints))
 
     def _squeezing(self, force: float, qpos: Floats) -> float:
         """Return the share towards which the gripper presses with a force, by its drives."""
