@@ -195,10 +195,10 @@ class Player:
             if self._later or away > waypoint.near:
                 self._check_progress(float(away))
                 return False
-            if waypoint.pushes and self._left(scene) > LACKING * self._stroke:
+            lacks = waypoint.pushes and self._left(scene) > LACKING * self._stroke
+            if lacks and self._waited < STANDS:
                 self._check_progress(float(away))
-                if self._waited < STANDS:
-                    return False
+                return False
         return waypoint.until is None or waypoint.until(scene)
 
     def _may_begin(self, done: set[str]) -> bool:
