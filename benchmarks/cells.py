@@ -1,16 +1,19 @@
 """``python -m benchmarks cells``: what the experts of cells solve with other robots than their own.
 
 All roles that admit a robot are filled with it; those that need fingers keep their own robot where
-it has none. Some cells are played by mixtures as well.
+it has none. Cells are also played by two makes in turn, drawn by the cell's name, and some by
+mixtures that were chosen.
 """
 
 from __future__ import annotations
 
+import signal
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import closing
-from itertools import product
+from collections.abc import Collection, Generator, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from itertools import cycle, permutations, product
 from pathlib import Path
+from random import Random
 
 import torch
 from tqdm import tqdm
@@ -25,11 +28,13 @@ from benchmarks.records import (
     write_record,
 )
 from robot_layouts.experts import find_expert
-from robots import RobotLayoutsError, RobotRegistry
+from robots import RobotLayoutsError, RobotRegistry, TaskError
 from tasks import Needs, get_task_class, list_tasks, make
 from tasks.episode import play
 
 ROBOTS = ("so101", "xarm7", "z1", "fetch", "ur10")
+PAIRED = ("so101", "xarm7", "panda", "z1", "ur5", "ur10")  # of which two makes are drawn
+PATIENCE = 150  # s that an expert may plan an episode
 MIXED = (
     ("CellPressTogether-v1", ("ur10", "panda", "xarm7")),
     ("CellGatherBlocks-v1", ("ur10", "panda_stick", "panda", "xarm7")),
@@ -49,6 +54,7 @@ def cells(
     robots: tuple[str, ...] = ROBOTS,
     tasks: tuple[str, ...] | None = None,
     seeds: int = 3,
+    pairs: int = 0,
     out: Path = DOCS / "cells_robots.json",
 ) -> int:
     """Let experts of cells play with other robots in all roles that admit them, and with mixtures.
@@ -57,15 +63,16 @@ def cells(
         robots: Of what makes, by their names in the catalogue; none leaves mixtures.
         tasks: Which cells; all of those that fit their robots if not given.
         seeds: How many episodes of each; those in the record are not played again.
+        pairs: Of how many pairs of makes each cell is also played, which take its roles in turn.
         out: The record, written after every episode; the page is beside it.
 
     Raises:
         RobotLayoutsError: If something cannot be read or written.
     """
     torch.set_num_threads(1)
-    record = read_record(out, versions={}, cells={}, mixed={})
+    record = read_record(out, versions={}, cells={}, pairs={}, mixed={})
     chosen = _of_the_library() if tasks is None else tasks
-    for task, label, named, kept in tqdm([*_cases(chosen, robots)], disable=None):
+    for task, label, named, kept in tqdm([*_cases(chosen, robots, pairs)], disable=None):
         seen = (
             record[kept].setdefault(task, {}).setdefault(label, {"robots": named, "episodes": {}})
         )
@@ -81,7 +88,7 @@ def cells(
     ]
     failures = [
         line
-        for kept in ("cells", "mixed")
+        for kept in ("cells", "pairs", "mixed")
         for task, of in sorted(record[kept].items())
         for line in _failures(task, of)
     ]
@@ -90,6 +97,7 @@ def cells(
         "cells_robots",
         versions=record["versions"],
         solved=table(("cell", *shown), [*rows, _total(record["cells"], shown)]),
+        pairs=_matrix(record["pairs"]),
         mixed=mixed,
         failures=failures,
     )
@@ -107,12 +115,19 @@ def _of_the_library() -> list[str]:
 
 
 def _cases(
-    tasks: Sequence[str], robots: Sequence[str]
+    tasks: Sequence[str], robots: Sequence[str], pairs: int
 ) -> Iterator[tuple[str, str, dict[str, str], str]]:
     """Yield what is played: the task, what its robots are called together, which, and the table."""
     for robot, task in product(robots, tasks):
         if roles := _roles(task, robot):
             yield task, robot, dict.fromkeys(roles, robot), "cells"
+    for task in tasks:
+        drawn = Random(task).sample([*permutations(PAIRED, 2)], pairs)
+        for two in drawn:
+            turns = zip(get_task_class(task).layout, cycle(two))
+            named = {role: robot for role, robot in turns if role in _roles(task, robot)}
+            if {*named.values()} == {*two}:
+                yield task, ", ".join(two), named, "pairs"
     for task, named in MIXED:
         if task in tasks:
             yield (
@@ -145,7 +160,8 @@ def _played(task: str, seen: Record, seeds: int) -> Iterator[None]:
         seen["scale"] = round(env.task.fit.scale, 2)
         for seed in missing:
             try:
-                plan = find_expert(task)(env, int(seed))
+                with _patience():
+                    plan = find_expert(task)(env, int(seed))
                 solved = play(env, int(seed), plan).solved
                 seen["episodes"][seed] = (
                     "" if solved else getattr(plan, "reason", "") or "not solved"
@@ -153,6 +169,22 @@ def _played(task: str, seen: Record, seeds: int) -> Iterator[None]:
             except RobotLayoutsError as error:
                 seen["episodes"][seed] = _first_line(error).removeprefix("no plan: ")
             yield
+
+
+@contextmanager
+def _patience() -> Generator[None]:
+    """Interrupt what takes longer than `PATIENCE`, with a TaskError."""
+
+    def give_up(*_: object) -> None:
+        raise TaskError(f"no plan within {PATIENCE} s")
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(PATIENCE)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def _first_line(error: RobotLayoutsError) -> str:
@@ -166,16 +198,31 @@ def _row(task: str, of: Mapping[str, Record], robots: Sequence[str]) -> Iterator
 
 
 def _of(seen: Record) -> str:
-    reasons = seen["episodes"].values()
-    return f"{_solved(reasons)} of {len(reasons)}"
+    return _share(seen["episodes"].values())
 
 
 def _total(record: Mapping[str, Mapping[str, Record]], robots: Sequence[str]) -> Iterator[str]:
     yield "all"
     for robot in robots:
         tried = [of[robot]["episodes"].values() for of in record.values() if robot in of]
-        solved = sum(_solved(reasons) for reasons in tried)
-        yield f"{solved} of {sum(map(len, tried))}"
+        yield _share([reason for reasons in tried for reason in reasons])
+
+
+def _matrix(record: Mapping[str, Mapping[str, Record]]) -> str:
+    """Return a table of what pairs of makes solve, by the first and the second of each."""
+    found: dict[str, list[str]] = {}
+    for of in record.values():
+        for label, seen in of.items():
+            found.setdefault(label, []).extend(seen["episodes"].values())
+    rows = [
+        (one, *(_share(found.get(f"{one}, {other}", ())) for other in PAIRED)) for one in PAIRED
+    ]
+    total = [reason for reasons in found.values() for reason in reasons]
+    return table(("", *PAIRED), [*rows, (f"all: {_share(total)}", *[""] * len(PAIRED))])
+
+
+def _share(reasons: Collection[str]) -> str:
+    return f"{_solved(reasons)} of {len(reasons)}" if reasons else "–"
 
 
 def _solved(reasons: Collection[str]) -> int:

@@ -14,7 +14,7 @@ from layouts.frames import Rectangle
 from layouts.layout import Layout
 from layouts.placement import Placement, RobotLike, faced, load_robot, load_robots
 from robot_layouts.core.quoting import shown
-from robot_layouts.kinematics.quaternions import forward, yaw_quaternion
+from robot_layouts.kinematics.quaternions import forward, inverted, rotated, yaw_quaternion
 from robots import (
     AssetError,
     LayoutError,
@@ -97,12 +97,12 @@ def at_task(
     _, by_reach = working_factors(after, layout, [*layout], ())
 
     def placed(share: float) -> Layout:
-        moved = {
-            place: _moved(layout[place], loaded[place], middle, share * factor)
-            for place, factor in zip(layout, factors, strict=True)
-            if place in loaded
-        }
-        return Layout({**layout, **moved}, layout.frames)
+        moved = dict(layout)
+        for place, factor in zip(layout, factors, strict=True):
+            robot = after[place].robot
+            others = 1.0 if robot == layout[place].robot else share
+            moved[place] = _moved(layout, place, robot, middle, factor * others)
+        return Layout(moved, layout.frames)
 
     if not any(map(lt, factors, by_reach)):  # else they stand nearer to each other than is usual
         return placed(1.0)
@@ -173,16 +173,25 @@ def _starting(placement: Placement, robot: RobotDescriptor) -> Placement:
     return placement
 
 
-def _moved(placement: Placement, robot: RobotDescriptor, middle: Point, factor: float) -> Placement:
+def _moved(
+    layout: Layout, place: str, robot: RobotDescriptor, middle: Point, factor: float
+) -> Placement:
     """Return a placement with another robot, as much farther from the middle as a factor says."""
-    if robot == placement.robot:
+    placement = layout[place]
+    if robot == placement.robot and factor == 1.0:
         return placement
     moved = _with(placement, robot)
+    *flat, z = placement.base_position
     if placement.on is None:
-        *flat, z = placement.base_position
         x, y = (round(m + (at - m) * factor, 4) for m, at in zip(middle, flat, strict=True))
         turned = faced(robot, placement.facing)
         moved = replace(moved, position=(x, y, z), quaternion=turned, rpy=None)
+    elif placement.on in layout.frames and factor != 1.0:
+        (x, y), turned = flat, inverted(layout.frame_poses[placement.on].quaternion)
+        way = rotated(turned, ((x - middle[0]) * (factor - 1), (y - middle[1]) * (factor - 1), 0.0))
+        along = zip(placement.local_pose.position, way, strict=True)
+        a, b, c = (round(at + further, 4) for at, further in along)
+        moved = replace(moved, position=(a, b, c))
     if not is_known_arm(robot):
         from layouts.ready import grounded
 
@@ -237,6 +246,10 @@ def _roles(robot: RobotDescriptor, places: Sequence[str]) -> dict[str, str]:
 
 def _middle(layout: Layout) -> Point:
     """Return the middle of what the robots of a task's layout work on, x and y (m)."""
+    edges = {str(placement.on) for placement in layout.values()}
+    tables = {edge.partition(".")[0] for edge in edges & layout.frames.keys()}
+    if len(tables) == 1 and edges <= layout.frames.keys():
+        return layout.frame_poses[tables.pop()].position[:2]
     x, y = (
         sum(along) / len(layout)
         for along in zip(

@@ -12,6 +12,7 @@ from robots.action_split import is_gripper
 from robots.gripper_motion import gripper_motion
 
 GAIN = 2.0  # of the joint error at most; a Panda's drives follow 0.4 of a target in one step
+PEAK = 2 / np.e  # of a critically damped drive's speed, as a share of stiffness over damping
 _LEAST_DAMPING = 1e-9  # N·m·s/rad; of drives that have none
 
 
@@ -68,6 +69,21 @@ class ArmDriver:
         stiffness, damping = np.array(group.stiffness), np.maximum(group.damping, _LEAST_DAMPING)
         follows = 1 - np.exp(-self._seconds * stiffness / damping)
         return 1 / np.maximum(follows, 1 / GAIN)
+
+    @property
+    def quickness(self) -> float:
+        """How fast an arm sets off towards where it is driven, as its slowest joint does (1/s)."""
+        rates = {
+            joint: rate
+            for group in self._groups.values()
+            for joint, rate in zip(group.joints, self._rates(group), strict=True)
+        }
+        return PEAK * max(min(rates[joint] for joint in self._arm_joints), _LEAST_DAMPING)
+
+    def _rates(self, group: JointGroup) -> Floats:
+        """Return how fast each joint's drive sets off, (joints,) (rad/s per rad still to go)."""
+        damping = np.maximum(group.damping, _LEAST_DAMPING)
+        return np.broadcast_to(self._gain(group) * group.stiffness / damping, len(group.joints))
 
     def _squeezing(self, force: float, qpos: Floats) -> float:
         """Return the share towards which the gripper presses with a force, by its drives."""

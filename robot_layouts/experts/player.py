@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import pi, remainder
+from math import pi, remainder, sqrt
 
 import numpy as np
 
@@ -26,6 +26,9 @@ SETTLING, LEADING = 0.1, 0.2  # rad from its goal at which an arm settles; share
 # Share of the force with which jaws that swing close, that they hold a cube with: with more it
 # slips out in time, with less as it is lifted.
 HOLDING = 0.5
+# What is pushed slides on by v² / 2µg (m): 2µg of bodies on a table (m/s²), and the share of its
+# way that a push may lack, unless it stands for so many control steps.
+SLOWS, LACKING, STANDS = 2 * 0.3 * 9.81, 0.3, 3
 AGAIN, WAITING = 4, 100  # control steps after which an arm that waits looks again, and gives up
 
 
@@ -85,7 +88,7 @@ class Player:
             self._alone, self._owner = alone, task.layout.owner(robot)
             joints = task.layout[self._owner].robot.joints
             self._own = [joints.index(joint) for joint in task.layout.arm(robot).robot.arm_joints]
-        if any(waypoint.at is not None for waypoint in waypoints):
+        if any(waypoint.at is not None or waypoint.pushes for waypoint in waypoints):
             self._reach = task.simulation.backend.point_reach(robot)
             self._base = scene.base(robot)
         self._jaws = _Jaws(task, robot, grip) if (grip := role_grip(task, robot)) else None
@@ -141,6 +144,9 @@ class Player:
         self._elapsed += 1
         qpos = scene.qpos(self._robot)
         goal = self._goal + self._lead(scene)
+        if self._current is not None and self._current.pushes:
+            most = sqrt(SLOWS * self._stroke) / self._driver.quickness
+            goal = self._arm(scene) + (goal - self._arm(scene)) * min(1.0, most / self._left(scene))
         share, squeeze = self._share, self._squeeze
         if self._jaws is not None and share is None and squeeze is None:
             share, squeeze = self._jaws.move(self._gripper, scene)
@@ -157,6 +163,18 @@ class Player:
         if np.abs(away).max() < SETTLING:
             self._leading = np.clip(self._leading + LEADING * away, -SETTLING, SETTLING)
         return self._leading
+
+    def _left(self, scene: Scene) -> float:
+        """Return how far the TCP still has to go (m)."""
+        arm = self._arm(scene)
+        point = self._in_link(scene, arm)
+        ends = [self._reach.place_of(point, joints) for joints in (arm, self._goal)]
+        return max(float(np.linalg.norm(ends[1] - ends[0])), 1e-6)
+
+    def _in_link(self, scene: Scene, arm: Floats) -> Floats:
+        """Return the TCP in its link's frame, (3,) (m)."""
+        origin, turned = self._reach.forward(arm)
+        return rotate(inverse(turned), scene.tcp(self._robot)[0] - origin)
 
     def _arm(self, scene: Scene) -> Floats:
         return self._driver.arm(scene.qpos(self._robot))
@@ -175,6 +193,10 @@ class Player:
         if any((waypoint.to, waypoint.turn, waypoint.at, waypoint.joints)):
             away = np.abs(self._arm(scene) - self._goal).max()
             if self._later or away > waypoint.near:
+                self._check_progress(float(away))
+                return False
+            lacks = waypoint.pushes and self._left(scene) > LACKING * self._stroke
+            if lacks and self._waited < STANDS:
                 self._check_progress(float(away))
                 return False
         return waypoint.until is None or waypoint.until(scene)
@@ -211,6 +233,8 @@ class Player:
         if waypoint.gripper is not None:
             share = waypoint.share(scene) if callable(waypoint.share) else waypoint.share
             self._gripper, self._share, self._squeeze = waypoint.gripper, share, waypoint.squeeze
+        if waypoint.pushes:
+            self._stroke = self._left(scene)
         self._begun, self._elapsed = self._begun + 1, 0
         self._nearest_yet, self._waited = np.inf, 0
 
@@ -270,8 +294,7 @@ class Player:
         first joint, which turns an arm about its base.
         """
         arm, tip = self._reach.arm(scene.qpos(self._robot)), scene.tcp(self._robot)[0]
-        origin, turned = self._reach.forward(arm)
-        point = rotate(inverse(turned), tip - origin)
+        point = self._in_link(scene, arm)
         about = remainder(heading(self._base, place) - heading(self._base, tip), 2 * pi)
         starts = [arm + about * side * (np.arange(len(arm)) == 0) for side in (0, 1, -1)]
         goals = [self._reach.solve(point, place, start) for start in starts]

@@ -140,6 +140,8 @@ class Waypoint:
             out when the waypoint begins if it is a function of the scene; see
             `robots.gripper_motion.GripperMotion`.
         squeeze: Instead of both, the force with which its fingers close meanwhile (N).
+        pushes: Whether the TCP pushes a body that slides: it goes no quicker than that this slides
+            on about as far as the waypoint leads, and must come near its end.
     """
 
     name: str
@@ -155,6 +157,7 @@ class Waypoint:
     joints: Callable[[Scene], Sequence[Floats]] | None = None
     share: Share | None = None
     squeeze: float | None = None
+    pushes: bool = False
 
 
 Script = Mapping[str, Sequence[Waypoint]]

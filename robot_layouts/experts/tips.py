@@ -14,7 +14,14 @@ import numpy as np
 
 from robot_layouts.experts.geometry import heading
 from robot_layouts.experts.grips import role_grip
-from robot_layouts.kinematics.rotations import Floats, inverse, multiply, quaternion_of, rotate
+from robot_layouts.kinematics.rotations import (
+    Floats,
+    inverse,
+    multiply,
+    quaternion_of,
+    rotate,
+    rotation_of,
+)
 from robot_layouts.kinematics.solve import descend_by_differences
 from robot_layouts.simulation.backend import PointSolver, PoseSolver
 from robots import RobotDescriptor
@@ -52,7 +59,8 @@ class TipSolver:
             held: What is brought to a place instead of the TCP, in the TCP link's frame, (3,) (m).
         """
         self._held = held
-        self._robot, self._reach, self._turn, self._base = robot, reach, turned, base
+        self._robot, self._reach, self._base = robot, reach, base
+        self._axes = rotate(turned, _AXES)
         self._tree = gripper_tree(robot)
         places = [robot.joints.index(joint) for joint in reach.joints]
         self._low, self._high = self._tree.limits[places].T
@@ -91,24 +99,26 @@ class TipSolver:
     def _near(
         self, start: Floats, tip: Floats, position: Floats, quaternion: Floats
     ) -> Floats | None:
-        axes = [rotate(quaternion, axis) for axis in _AXES]
+        axes = rotate(quaternion, _AXES)
 
         def errors(joints: Floats) -> Floats:
-            _, link = self._reach.forward(joints)
-            turned = multiply(link, self._turn)
-            away = self._reach.place_of(tip, joints) - position
-            turns = [
-                rotate(turned, axis) - wanted for axis, wanted in zip(_AXES, axes, strict=True)
-            ]
-            return np.concatenate([away, *(_TURN_WORTH * turn for turn in turns)])
+            origin, link = self._reach.forward(joints)
+            turned = rotation_of(link)
+            turns = _TURN_WORTH * (self._axes @ turned.T - axes)
+            return np.concatenate([origin + turned @ tip - position, turns.ravel()])
+
+        def fits(joints: Floats) -> bool:
+            missing = np.abs(errors(joints))
+            return bool(missing[:3].max() < _PLACE and missing[3:].max() < _TURN * _TURN_WORTH)
 
         near = self._reach.solve(tip, position, start)
         begun = start if near is None else near
-        found = descend_by_differences(errors, begun, range(len(start)))
-        found = np.clip(found, self._low, self._high)
-        missing = np.abs(errors(found))
-        fits = missing[:3].max() < _PLACE and missing[3:].max() < _TURN * _TURN_WORTH
-        return found if fits else None
+        free, limits = range(len(start)), np.stack([self._low, self._high], axis=1)
+        found = descend_by_differences(errors, begun, free)
+        bounded = np.clip(found, *limits.T)
+        if not fits(bounded) and (bounded != found).any():  # the other joints make up for those
+            bounded = descend_by_differences(errors, bounded, free, limits)
+        return bounded if fits(bounded) else None
 
 
 class TurnedSolver:

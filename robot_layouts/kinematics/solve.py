@@ -297,7 +297,10 @@ def by_way(candidates: Iterable[Floats], start: Floats) -> list[Floats]:
 
 
 def descend_by_differences(
-    errors: Callable[[Floats], Floats], start: Floats, free: Sequence[int]
+    errors: Callable[[Floats], Floats],
+    start: Floats,
+    free: Sequence[int],
+    limits: Floats | None = None,
 ) -> Floats:
     """Bring a function of joints, of which nothing is known but its values, towards 0.
 
@@ -306,9 +309,11 @@ def descend_by_differences(
     Args:
         errors: What is missing at some joints: (joints,) to (errors,).
         start: Joint positions, (joints,) (rad, m).
-        free: Indices of the joints that may move; limits are not looked at.
+        free: Indices of the joints that may move.
+        limits: Between which they stay, (joints, 2) (rad, m); None if anywhere will do.
     """
     joints = start.astype(float)
+    low, high = (-np.inf, np.inf) if limits is None else limits[list(free)].T
     for _ in range(_DIFFERENCE_STEPS):
         error = errors(joints)
         slopes = np.zeros((len(error), len(free)))
@@ -316,8 +321,11 @@ def descend_by_differences(
             moved = joints.copy()
             moved[joint] += _DIFFERENCE
             slopes[:, column] = (errors(moved) - error) / _DIFFERENCE
+        if limits is not None:  # a joint at one that it is drawn beyond leaves the way to others
+            slopes *= _inward(-error @ slopes, joints[free], low, high)
         step = np.linalg.lstsq(slopes, -error, rcond=None)[0]
         joints[free] += np.clip(step, -_LONGEST_DIFFERENCE_STEP, _LONGEST_DIFFERENCE_STEP)
+        joints[free] = np.clip(joints[free], low, high)
         if np.abs(step).max() < _DIFFERENCE:
             break
     return joints

@@ -198,14 +198,18 @@ class PointReach:
                 raise UnknownNameError("arm joint", joint, self.joints)
         free = [i for i, joint in enumerate(self.joints) if joint not in fixed]
 
+        def away(arm: Floats) -> Floats:
+            return self.place_of(point, arm) - place
+
         def errors(arm: Floats) -> Floats:
             way = _SHORT_WAY * ((arm - start)[free] / _LONG_WAY) ** 3  # the longest counts most
-            return np.concatenate([self.place_of(point, arm) - place, way])
+            return np.concatenate([away(arm), way])
 
-        arm = descend_by_differences(errors, start, free)
-        arm = np.clip(arm, self._model.low, self._model.high)
-        away = np.linalg.norm(self.place_of(point, arm) - place)
-        return arm if away < _ARRIVED else None
+        limits = np.stack([self._model.low, self._model.high], axis=1)
+        arm = np.clip(descend_by_differences(errors, start, free), *limits.T)
+        if np.linalg.norm(away(arm)) >= _ARRIVED:  # a long way, or one along limits
+            arm = descend_by_differences(away, start, free, limits)
+        return arm if np.linalg.norm(away(arm)) < _ARRIVED else None
 
 
 class TreeArm:

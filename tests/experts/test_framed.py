@@ -77,12 +77,16 @@ def test_a_script_as_declared_goes_where_its_numbers_are_in_the_world(small):
     assert world[2] == pytest.approx(0.1 * fit.scale)
 
 
-CASES = [*((cell, "so101") for cell in WITHOUT_FINGERS), ("SetFaders", "z1")]
+CASES = [
+    *((cell, "so101") for cell in (*WITHOUT_FINGERS, "PushBar")),
+    ("SetFaders", "z1"),
+    *((cell, "ur10") for cell in ("PushBar", "TakeSides")),
+]
 
 
 @pytest.mark.parametrize(("cell", "robot"), CASES)
 def test_arms_of_other_sizes_solve_cells_that_take_no_fingers(cell: str, robot: str):
-    """Arms of five joints among them, and one that leans where it does not reach upright."""
+    """Arms of five joints, one that leans where it does not reach upright, and some that jump."""
     env = of(cell, robot)
     plan = find_expert(env.task_id)(env, 0)
     assert play(env, 0, plan).solved, plan.reason

@@ -50,6 +50,14 @@ def test_what_the_roles_do_is_in_reach_of_the_one_that_reaches_least():
     assert distances["near"] == pytest.approx(0.8 * 0.48 / 0.855, abs=1e-3)
 
 
+def test_where_all_reach_farther_a_large_arm_of_the_task_stands_farther_too():
+    three = ring({"far": "ur10", "near": "panda", "other": "panda"}, radius=0.8)
+    placed = at_task({"near": "ur10", "other": "ur10"}, three)
+    distances = {abs(complex(*p.base_position[:2])) for p in placed.values()}
+    np.testing.assert_allclose(sorted(distances), 0.8 * 1.343 / 0.855, atol=1e-3)
+    assert at_task({"near": "ur10"}, three)["far"] == three["far"]
+
+
 def test_an_arm_that_holds_things_stands_where_it_reaches_them_with_its_gripper_down():
     """An SO-101 reaches 0.48 m, but only about two thirds of that far down to the ground."""
     three = ring(dict.fromkeys(("a", "b", "c"), "panda"), radius=1.5)
@@ -141,6 +149,17 @@ def test_wheels_stand_on_an_edge_of_a_table_as_well():
     at = at_task({"b": "fetch"}, edges)["b"]
     assert at.on == "table.west"
     assert at.base_position[2] == pytest.approx(0.005, abs=2e-3)
+
+
+def test_small_arms_on_edges_of_a_table_stand_nearer_to_its_middle():
+    """Also where they all stand on one side of it."""
+    edges = around_table({"a": "panda", "b": "panda"}, edges=("west", "west"), table=(1.8, 1.7))
+    share = RobotRegistry.load("so101").reach / RobotRegistry.load("panda").reach
+    for name, placement in at_task("so101", edges).items():
+        assert placement.on == edges[name].on
+        own = np.array(edges[name].base_position)
+        np.testing.assert_allclose(placement.base_position, share * own, atol=2e-4)
+    assert at_task("panda_wristcam", edges)["a"].base_pose == edges["a"].base_pose
 
 
 def test_what_does_not_fit_is_refused():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from robot_layouts.kinematics.solve import scattered
 from robot_layouts.simulation.sapien3.arms import SapienArm
 from robot_layouts.simulation.solvers import PointReach
 from robots import UnknownNameError
@@ -41,6 +42,16 @@ def test_fixed_joints_stay():
     assert solution is not None
     moved = np.abs(solution - start) > 0
     assert moved.tolist() == [True, True, True, True, False]
+
+
+def test_places_far_from_where_an_arm_rests_are_found():
+    """Of 30 random postures' places, on a long way or at limits of joints, nearly all."""
+    arm = SapienArm(world_of("so100"), "arm")
+    reach, start = PointReach(arm), start_of("so100")
+    postures = scattered(np.stack([arm.low, arm.high], axis=1), 30)
+    places = [reach.place_of(POINT, posture) for posture in postures]
+    found = [reach.solve(POINT, place, reach.arm(start)) for place in places]
+    assert sum(one is not None for one in found) >= 27
 
 
 def test_a_place_out_of_reach_has_no_solution():

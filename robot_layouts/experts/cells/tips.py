@@ -77,7 +77,7 @@ def push(
         go(f"above {body}", partial(behind, up=HIGH), near=0.05, after=tuple(after)),
         go(f"behind {body}", partial(behind, up=height), near=0.03),
         *(
-            go(f"push {body} {i}", partial(along, left=strokes - i), near=0.03)
+            go(f"push {body} {i}", partial(along, left=strokes - i), near=0.03, pushes=True)
             for i in range(strokes)
         ),
         go(f"back {body}", partial(back, up=height), near=0.1),
@@ -133,7 +133,13 @@ def advance(
     def step(stroke: int) -> Waypoint:
         before = f"push {body} {stroke - 1}" if stroke else f"at {body}"
         waits = tuple(f"{other}.{before}" for other in beside)
-        return go(f"push {body} {stroke}", partial(along, stroke=stroke), near=0.03, after=waits)
+        return go(
+            f"push {body} {stroke}",
+            partial(along, stroke=stroke),
+            near=0.03,
+            after=waits,
+            pushes=True,
+        )
 
     return (
         go(f"above {body}", partial(at, up=HIGH), near=0.05),
