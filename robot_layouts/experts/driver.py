@@ -92,5 +92,5 @@ class ArmDriver:
         error = target - qpos[[self._place[joint] for joint in group.joints]]
         gain = self._gain(group)
         numbers = (2 * gain * error - high - low) / (high - low)
-        most = gain / GAIN if holding else np.ones(group.size)
+        most = (gain / GAIN) ** 3 if holding else np.ones(group.size)
         return numbers / max(1.0, (np.abs(numbers) / most).max())

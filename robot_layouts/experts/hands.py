@@ -108,7 +108,9 @@ class Hand:
         )
         self._random = scattered(self._tree.limits[self._aiming], RANDOM_STARTS)
 
-    def grip(self, side: float, depth: float, firmness: float = 1.0) -> Grip | None:
+    def grip(
+        self, side: float, depth: float, firmness: float = 1.0, *, shaken: bool = True
+    ) -> Grip | None:
         """Return how it holds a cube, as it was seen to in physics; None if it does not.
 
         Args:
@@ -116,15 +118,21 @@ class Hand:
             depth: How far before the middle of its pads the cube's middle is when they close, as a
                 share of its side.
             firmness: Factor on the usual force with which it holds the cube.
+            shaken: Whether the cube must stay in the hand when that is shaken.
 
         Raises:
             RobotLayoutsError: If the robot cannot be built.
         """
-        return grip_of(self._robot, self._limb, round(side, 6), depth, firmness, self._simulator)
+        side, simulator = round(side, 6), self._simulator
+        return grip_of(self._robot, self._limb, side, depth, firmness, simulator, shaken=shaken)
 
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""
         return scene.qpos(self.owner)
+
+    def share(self, scene: Scene) -> float:
+        """Return how far its gripper is open now, from 0 to 1."""
+        return self.motion.share_at(self.qpos(scene)[self._gripper])
 
     def like(self, scene: Scene, posture: Floats) -> Floats:
         """Return a posture of the arm with all other joints where they are now, (dof,) (rad, m)."""
@@ -167,7 +175,7 @@ class Hand:
         if not swings(self.motion, opening):
             return self.pointing(self.motion.middle(self.motion.share(opening)))
         side = max(opening, LEAST_SIDE)
-        grips = (self.grip(side, depth) for depth in MIDDLE_DEPTHS)
+        grips = (self.grip(side, depth, shaken=False) for depth in MIDDLE_DEPTHS)
         grip = next((grip for grip in grips if grip is not None), None)
         if grip is None:
             return None
