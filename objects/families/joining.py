@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, pi, sin
 
 from objects.descriptor import Grasp
@@ -19,6 +20,7 @@ from objects.families.making import (
     around,
     block,
     disc,
+    edge,
     from_above,
     grips,
     point,
@@ -112,7 +114,10 @@ def shaft(radius: float, length: float) -> Made:
             block((2 * half, 2 * half, base), (0.0, 0.0, base / 2), GREY_PLASTIC),
             disc(radius, base, base + length, STEEL),
         ],
-        _rod_grips(radius, base, length, "shaft"),
+        [
+            *_rod_grips(radius, base, length, "shaft"),
+            *_under(base / 2, 2 * half, "base", around(4)),
+        ],
         {"tip": point(0.0, 0.0, base + length), "seat": point(0.0, 0.0, base)},
     )
 
@@ -140,13 +145,16 @@ def gear(radius: float, length: float) -> Made:
     inner = tube((hole, hub, 0.0), (hole, hub, thick + 0.012), RED_PLASTIC)
     return Made(
         [*outer, *inner, *teeth],
-        from_above(
-            thick + 0.006,
-            2 * hub * FLAT,
-            "hub",
-            around(8, pi / SECTIONS, pi + pi / SECTIONS),
-            pitches=(-0.15, 0.15),
-        ),
+        [
+            *from_above(
+                thick + 0.006,
+                2 * hub * FLAT,
+                "hub",
+                around(8, pi / SECTIONS, pi + pi / SECTIONS),
+                pitches=(-0.15, 0.15),
+            ),
+            *edge(root, thick / 2, thick, "teeth"),
+        ],
         {"bore": point(0.0, 0.0, 0.0, DOWN), "hub": point(0.0, 0.0, thick + 0.012)},
     )
 
@@ -160,7 +168,10 @@ def bolt(radius: float, length: float) -> Made:
             prism(polygon(head, 6), 0.0, thick, STEEL),
             disc(radius, thick, thick + length, STEEL),
         ],
-        _rod_grips(radius, thick, length, "shank"),
+        [
+            *_rod_grips(radius, thick, length, "shank"),
+            *_under(thick / 2, 2 * head * cos(pi / 6), "head", around(6, pi / 6, 2 * pi + pi / 6)),
+        ],
         {"tip": point(0.0, 0.0, thick + length), "head": point(0.0, 0.0, 0.0, DOWN)},
     )
 
@@ -305,4 +316,27 @@ def _rod_grips(radius: float, low: float, length: float, part: str) -> list[Gras
     return [
         *grips(middle, UP, (1.0, 0.0, 0.0), 2 * radius, part, tilts=around(8)),
         *from_above(top, 2 * radius, "tip", around(4, 0.0, pi)),
+    ]
+
+
+def _under(height: float, width: float, part: str, angles: Sequence[float]) -> list[Grasp]:
+    """Return grasps of an upright thing's foot: from below, and level.
+
+    Args:
+        height: Of the fingers' middle.
+        width: Of the foot.
+        part: What it is called.
+        angles: How the gripper is turned: its fingers part at a right angle to that (rad).
+    """
+    return [
+        grasp
+        for angle in angles
+        for grasp in grips(
+            (0.0, 0.0, height),
+            (cos(angle), sin(angle), 0.0),
+            DOWN,
+            width,
+            part,
+            pitches=(0.0, pi / 2),
+        )
     ]
