@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import cos, pi, sin
 
 from objects.descriptor import Grasp
@@ -116,7 +115,7 @@ def shaft(radius: float, length: float) -> Made:
         ],
         [
             *_rod_grips(radius, base, length, "shaft"),
-            *_under(base / 2, 2 * half, "base", around(4)),
+            *_foot_grips(base / 2, 2 * half, "base", 4),
         ],
         {"tip": point(0.0, 0.0, base + length), "seat": point(0.0, 0.0, base)},
     )
@@ -170,7 +169,7 @@ def bolt(radius: float, length: float) -> Made:
         ],
         [
             *_rod_grips(radius, thick, length, "shank"),
-            *_under(thick / 2, 2 * head * cos(pi / 6), "head", around(6, pi / 6, 2 * pi + pi / 6)),
+            *_foot_grips(thick / 2, 2 * head * cos(pi / 6), "head", 6),
         ],
         {"tip": point(0.0, 0.0, thick + length), "head": point(0.0, 0.0, 0.0, DOWN)},
     )
@@ -319,24 +318,21 @@ def _rod_grips(radius: float, low: float, length: float, part: str) -> list[Gras
     ]
 
 
-def _under(height: float, width: float, part: str, angles: Sequence[float]) -> list[Grasp]:
-    """Return grasps of an upright thing's foot: from below, and level.
+def _foot_grips(height: float, width: float, part: str, sides: int) -> list[Grasp]:
+    """Return grasps of an upright thing's foot, by its faces: from all sides, and from below.
 
     Args:
         height: Of the fingers' middle.
-        width: Of the foot.
+        width: Of the foot, from face to face.
         part: What it is called.
-        angles: How the gripper is turned: its fingers part at a right angle to that (rad).
+        sides: How many faces it has, the first along y.
     """
+    middle = (0.0, 0.0, height)
     return [
-        grasp
-        for angle in angles
-        for grasp in grips(
-            (0.0, 0.0, height),
-            (cos(angle), sin(angle), 0.0),
-            DOWN,
-            width,
-            part,
-            pitches=(0.0, pi / 2),
-        )
+        *grips(middle, UP, (1.0, 0.0, 0.0), width, part, tilts=around(sides)),
+        *(
+            grasp
+            for angle in around(sides // 2, 0.0, pi)
+            for grasp in grips(middle, (cos(angle), sin(angle), 0.0), DOWN, width, part)
+        ),
     ]

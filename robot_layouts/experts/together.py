@@ -49,7 +49,6 @@ HEIGHTS, LIFT = (0.4, 0.5, 0.3), 0.05
 LEANS = tuple(map(radians, (20, 50, 80, 100)))  # of the giver when it gives, from straight down
 HEADINGS = tuple(map(radians, (0, 45, -45)))  # of the giver then, from the way to the taker
 BESIDE = 0.08  # m between hands that lift a thing together
-BESIDE_OFF = (0.02, 0.006, 0.0)  # m that each may come nearer to the others, the best first
 APART, OPPOSED = 0.02, 0.4  # m between hands, or cosine between their approaches at most
 WIDER = 0.024  # m between each pad and a thing, for hands that hold it crosswise
 BACKWARD = -0.3  # cosine between the taker's approach and its way to the thing, at least
@@ -160,7 +159,7 @@ def _sides(
         for robot, hand in hands.items()
     }
     room = room_of(task, scene)
-    for off in BESIDE_OFF:
+    for off in (CLOSER, 0.0):
         nearer = {
             robot: [
                 (hold, posture, _moved(hands[robot], hold, scene, posture, middle, off))
