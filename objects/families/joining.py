@@ -19,6 +19,7 @@ from objects.families.making import (
     around,
     block,
     disc,
+    edge,
     from_above,
     grips,
     point,
@@ -112,7 +113,10 @@ def shaft(radius: float, length: float) -> Made:
             block((2 * half, 2 * half, base), (0.0, 0.0, base / 2), GREY_PLASTIC),
             disc(radius, base, base + length, STEEL),
         ],
-        _rod_grips(radius, base, length, "shaft"),
+        [
+            *_rod_grips(radius, base, length, "shaft"),
+            *_foot_grips(base / 2, 2 * half, "base", 4),
+        ],
         {"tip": point(0.0, 0.0, base + length), "seat": point(0.0, 0.0, base)},
     )
 
@@ -140,13 +144,16 @@ def gear(radius: float, length: float) -> Made:
     inner = tube((hole, hub, 0.0), (hole, hub, thick + 0.012), RED_PLASTIC)
     return Made(
         [*outer, *inner, *teeth],
-        from_above(
-            thick + 0.006,
-            2 * hub * FLAT,
-            "hub",
-            around(8, pi / SECTIONS, pi + pi / SECTIONS),
-            pitches=(-0.15, 0.15),
-        ),
+        [
+            *from_above(
+                thick + 0.006,
+                2 * hub * FLAT,
+                "hub",
+                around(8, pi / SECTIONS, pi + pi / SECTIONS),
+                pitches=(-0.15, 0.15),
+            ),
+            *edge(root, thick / 2, thick, "teeth"),
+        ],
         {"bore": point(0.0, 0.0, 0.0, DOWN), "hub": point(0.0, 0.0, thick + 0.012)},
     )
 
@@ -160,7 +167,10 @@ def bolt(radius: float, length: float) -> Made:
             prism(polygon(head, 6), 0.0, thick, STEEL),
             disc(radius, thick, thick + length, STEEL),
         ],
-        _rod_grips(radius, thick, length, "shank"),
+        [
+            *_rod_grips(radius, thick, length, "shank"),
+            *_foot_grips(thick / 2, 2 * head * cos(pi / 6), "head", 6),
+        ],
         {"tip": point(0.0, 0.0, thick + length), "head": point(0.0, 0.0, 0.0, DOWN)},
     )
 
@@ -305,4 +315,24 @@ def _rod_grips(radius: float, low: float, length: float, part: str) -> list[Gras
     return [
         *grips(middle, UP, (1.0, 0.0, 0.0), 2 * radius, part, tilts=around(8)),
         *from_above(top, 2 * radius, "tip", around(4, 0.0, pi)),
+    ]
+
+
+def _foot_grips(height: float, width: float, part: str, sides: int) -> list[Grasp]:
+    """Return grasps of an upright thing's foot, by its faces: from all sides, and from below.
+
+    Args:
+        height: Of the fingers' middle.
+        width: Of the foot, from face to face.
+        part: What it is called.
+        sides: How many faces it has, the first along y.
+    """
+    middle = (0.0, 0.0, height)
+    return [
+        *grips(middle, UP, (1.0, 0.0, 0.0), width, part, tilts=around(sides)),
+        *(
+            grasp
+            for angle in around(sides // 2, 0.0, pi)
+            for grasp in grips(middle, (cos(angle), sin(angle), 0.0), DOWN, width, part)
+        ),
     ]

@@ -291,6 +291,28 @@ def around(count: int, first: float = 0.0, last: float = 2 * pi) -> list[float]:
     return [first + (last - first) * i / count for i in range(count)]
 
 
+def edge(radius: float, height: float, thick: float, part: str) -> list[Grasp]:
+    """Return grasps of an upright round body's edge, by its faces: level, from all round.
+
+    Args:
+        radius: Where the fingers meet.
+        height: Of their middle.
+        thick: What is held, from its upper face to its lower one.
+        part: What it is called.
+    """
+    return [
+        grasp
+        for angle in around(8)
+        for grasp in grips(
+            (radius * cos(angle), radius * sin(angle), height),
+            (-sin(angle), cos(angle), 0.0),
+            (cos(angle), sin(angle), 0.0),
+            thick,
+            part,
+        )
+    ]
+
+
 def rim(
     bottom: Ring, top: Ring, wall: float, facets: Sequence[int], deep: float = DEEP
 ) -> list[Grasp]:

@@ -13,6 +13,8 @@ from robots.gripper_motion import gripper_motion
 
 GAIN = 2.0  # of the joint error at most; a Panda's drives follow 0.4 of a target in one step
 PEAK = 2 / np.e  # of a critically damped drive's speed, as a share of stiffness over damping
+GENTLY = 0.25  # of their speed, with what quick fingers hold, since each step of an arm shakes it
+QUICK = 2.0  # times that quick drives nearly settle in a control step
 _LEAST_DAMPING = 1e-9  # N·m·s/rad; of drives that have none
 
 
@@ -26,6 +28,7 @@ class ArmDriver:
         self._arm_joints = descriptor.arm_joints
         self._groups = dict(descriptor.action_split.groups)
         self._descriptor = descriptor
+        self._carrying = GENTLY if has_quick_fingers(descriptor, seconds) else 1.0
 
     def arm(self, qpos: Floats) -> Floats:
         """Pick the arm's joints out of all joints in the descriptor's order, (dof,)."""
@@ -108,5 +111,19 @@ class ArmDriver:
         error = target - qpos[[self._place[joint] for joint in group.joints]]
         gain = self._gain(group)
         numbers = (2 * gain * error - high - low) / (high - low)
-        most = gain / GAIN if holding else np.ones(group.size)
+        most = self._carrying * gain / GAIN if holding else np.ones(group.size)
         return numbers / max(1.0, (np.abs(numbers) / most).max())
+
+
+def has_quick_fingers(robot: RobotDescriptor, seconds: float) -> bool:
+    """Return whether fingers are where they are driven to after each control step.
+
+    Args:
+        robot: A robot or a limb.
+        seconds: How long a control step takes (s).
+    """
+    return all(
+        np.min(group.stiffness) * seconds > QUICK * np.max(group.damping)
+        for name, group in robot.action_split.groups.items()
+        if is_gripper(name) and group.size
+    )

@@ -104,6 +104,7 @@ def grip_of(
     firmness: float,
     simulator: str,
     wider: tuple[float, ...] = WIDER,
+    shaken: bool = True,
 ) -> Grip | None:
     """Return how a gripper holds a cube, as it was seen to in physics; None if it does not.
 
@@ -116,6 +117,7 @@ def grip_of(
         firmness: Factor on the usual force with which it holds the cube.
         simulator: In which that is tried.
         wider: How far it may be open before it closes, as factors of the side, the best first.
+        shaken: Whether the cube must stay in the hand when that is shaken.
 
     Raises:
         RobotLayoutsError: If the robot cannot be built.
@@ -137,6 +139,6 @@ def grip_of(
         if not closing.has_room(qpos, place):
             continue
         closed = closing.close(qpos, place, firmness)
-        if closed.held and closed.slipped < SLIPS * side:
+        if closed.held and closed.slipped < SLIPS * side if shaken else closed.grasped:
             return Grip(pose, share, closed.share, firmness, closed.pose, side)
     return None

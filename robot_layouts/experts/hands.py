@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_layouts.experts.driver import has_quick_fingers
 from robot_layouts.experts.grips import MIDDLE_DEPTHS, Grip, grip_of, swings
 from robot_layouts.experts.script import Scene
 from robot_layouts.kinematics.rotations import (
@@ -17,7 +18,6 @@ from robot_layouts.kinematics.rotations import (
     rotation_about,
 )
 from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
-from robots.action_split import is_gripper
 from robots.gripper_motion import aiming_joints, gripper_motion, link_tree, wrist_of
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
@@ -29,7 +29,6 @@ TURN_WORTH = 0.02  # m that a turn by 1 rad is worth to an arm of fewer joints
 FIRST_ITERATIONS, ITERATIONS = 12, 30
 NEAR, NEAR_TURN = 0.1, 0.8  # m and rad from a goal after the first of them
 RANDOM_STARTS = 3
-QUICK = 2.0  # times that quick drives nearly settle in a control step
 FIRMNESSES = (1.0, 2.5)  # factors on the force with which a cube is held; the first that suffices
 CLOSING, STEP = 60.0, 4e-4  # N with which fingers close, at least; m per step, at least
 YIELD = 6e-5  # m that quick fingers are driven into what they hold, at least
@@ -100,15 +99,13 @@ class Hand:
         self._aiming = [robot.joints.index(joint) for joint in aiming_joints(robot, own)]
         few = len(self._aiming) < FULL
         self._turn, self._worth = (ROUGH_TURN, TURN_WORTH) if few else (TURN, 1.0)
-        self._simulator, seconds = task.scenario.simulator, 1 / task.scenario.control_frequency
-        self.quick = all(
-            np.min(group.stiffness) * seconds > QUICK * np.max(group.damping)
-            for name, group in own.action_split.groups.items()
-            if is_gripper(name) and group.size
-        )
+        self._simulator = task.scenario.simulator
+        self.quick = has_quick_fingers(own, 1 / task.scenario.control_frequency)
         self._random = scattered(self._tree.limits[self._aiming], RANDOM_STARTS)
 
-    def grip(self, side: float, depth: float, firmness: float = 1.0) -> Grip | None:
+    def grip(
+        self, side: float, depth: float, firmness: float = 1.0, *, shaken: bool = True
+    ) -> Grip | None:
         """Return how it holds a cube, as it was seen to in physics; None if it does not.
 
         Args:
@@ -116,15 +113,21 @@ class Hand:
             depth: How far before the middle of its pads the cube's middle is when they close, as a
                 share of its side.
             firmness: Factor on the usual force with which it holds the cube.
+            shaken: Whether the cube must stay in the hand when that is shaken.
 
         Raises:
             RobotLayoutsError: If the robot cannot be built.
         """
-        return grip_of(self._robot, self._limb, round(side, 6), depth, firmness, self._simulator)
+        side, simulator = round(side, 6), self._simulator
+        return grip_of(self._robot, self._limb, side, depth, firmness, simulator, shaken=shaken)
 
     def qpos(self, scene: Scene) -> Floats:
         """Return all joints of its robot now, (dof,) (rad, m)."""
         return scene.qpos(self.owner)
+
+    def share(self, scene: Scene) -> float:
+        """Return how far its gripper is open now, from 0 to 1."""
+        return self.motion.share_at(self.qpos(scene)[self._gripper])
 
     def like(self, scene: Scene, posture: Floats) -> Floats:
         """Return a posture of the arm with all other joints where they are now, (dof,) (rad, m)."""
@@ -167,7 +170,7 @@ class Hand:
         if not swings(self.motion, opening):
             return self.pointing(self.motion.middle(self.motion.share(opening)))
         side = max(opening, LEAST_SIDE)
-        grips = (self.grip(side, depth) for depth in MIDDLE_DEPTHS)
+        grips = (self.grip(side, depth, shaken=False) for depth in MIDDLE_DEPTHS)
         grip = next((grip for grip in grips if grip is not None), None)
         if grip is None:
             return None

@@ -17,6 +17,7 @@ from robots import TaskError
 AJAR = 0.008  # m; between each pad and what it is to hold, before it closes
 SPLAYED = 0.6  # rad; between pads that are turned more a thing slips out
 FIRM, FIRM_PER_MASS = 30.0, 60.0  # N and N/kg: how hard a thing is held
+GENTLE = 15.0  # N instead, where drives are so quick that they push fingers into it
 PRESSING, ENOUGH = 0.2, 8.0  # share of that, and N, which a thing feels before it is moved
 
 
@@ -155,7 +156,7 @@ def holds_of(hand: Hand, body: str, thing: ObjectDescriptor, parts: Sequence[str
         if grasp.opening in closing
     )
     carried = thing.mass if any(hold.body == body for hold in each) else 0.0
-    force = FIRM + FIRM_PER_MASS * carried
+    force = (GENTLE if hand.quick else FIRM) + FIRM_PER_MASS * carried
     return Holds(
         each,
         hand.closing(wide),

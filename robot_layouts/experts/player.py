@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import pi, remainder, sqrt
 
 import numpy as np
@@ -92,10 +92,10 @@ class Player:
             self._reach = task.simulation.backend.point_reach(robot)
             self._base = scene.base(robot)
         self._jaws = _Jaws(task, robot, grip) if (grip := role_grip(task, robot)) else None
-        self._goal = self._driver.arm(scene.qpos(robot))
+        self._goal = self._start = self._driver.arm(scene.qpos(robot))
         self._gripper: float = OPEN
         self._share: float | None = None
-        self._squeeze: float | None = None
+        self._squeeze: float | Callable[[Scene], float] | None = None
         self._leading = np.zeros_like(self._goal)
         self._current: Waypoint | None = None
         self._begun = self._elapsed = 0  # waypoints begun; steps taken in the current one
@@ -143,23 +143,28 @@ class Player:
             self._begin(self._waypoints[self._begun], scene)
         self._elapsed += 1
         qpos = scene.qpos(self._robot)
-        goal = self._goal + self._lead(scene)
+        goal = self._goal
+        if self._current is not None and self._current.progress is not None:
+            goal = goal - (1 - self._current.progress(scene)) * (goal - self._start)
+        goal = goal + self._lead(goal, scene)
         if self._current is not None and self._current.pushes:
             most = sqrt(SLOWS * self._stroke) / self._driver.quickness
             goal = self._arm(scene) + (goal - self._arm(scene)) * min(1.0, most / self._left(scene))
         share, squeeze = self._share, self._squeeze
+        if callable(squeeze):
+            squeeze = squeeze(scene)
         if self._jaws is not None and share is None and squeeze is None:
             share, squeeze = self._jaws.move(self._gripper, scene)
         return self._driver.action(goal, self._gripper, qpos, share, squeeze)
 
-    def _lead(self, scene: Scene) -> Floats | float:
-        """Return how far beyond its goal an arm is driven, so that its weight does not hold it off.
+    def _lead(self, goal: Floats, scene: Scene) -> Floats | float:
+        """Return how far beyond a goal an arm is driven, so that its weight does not hold it off.
 
         It grows while the arm is near a posture that it was asked for as such.
         """
         if self._current is None or self._current.joints is None:
             return 0.0
-        away = self._goal - self._arm(scene)
+        away = goal - self._arm(scene)
         if np.abs(away).max() < SETTLING:
             self._leading = np.clip(self._leading + LEADING * away, -SETTLING, SETTLING)
         return self._leading
@@ -220,6 +225,7 @@ class Player:
     def _begin(self, waypoint: Waypoint, scene: Scene) -> None:
         name = f"{self._robot}.{waypoint.name}"
         goals = self._goals(name, waypoint, scene)
+        self._start = self._goal
         if goals and self._ways is not None:
             way = self._free_way(name, goals, scene)
             if way is None:

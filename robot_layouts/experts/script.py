@@ -139,7 +139,10 @@ class Waypoint:
         share: Instead of ``gripper``, how far the gripper is open meanwhile, from 0 to 1, worked
             out when the waypoint begins if it is a function of the scene; see
             `robots.gripper_motion.GripperMotion`.
-        squeeze: Instead of both, the force with which its fingers close meanwhile (N).
+        squeeze: Instead of both, the force with which its fingers close meanwhile (N), or what
+            works that out from the scene at every step.
+        progress: How much of its way the arm is to have gone, from 0 to 1, worked out from the
+            scene at every step; without it, it goes as fast as it can.
         pushes: Whether the TCP pushes a body that slides: it goes no quicker than that this slides
             on about as far as the waypoint leads, and must come near its end.
     """
@@ -156,7 +159,8 @@ class Waypoint:
     at: Callable[[Scene], Floats] | None = None
     joints: Callable[[Scene], Sequence[Floats]] | None = None
     share: Share | None = None
-    squeeze: float | None = None
+    squeeze: float | Callable[[Scene], float] | None = None
+    progress: Callable[[Scene], float] | None = None
     pushes: bool = False
 
 

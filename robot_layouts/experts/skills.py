@@ -16,6 +16,7 @@ import numpy as np
 
 from objects import NamedPoint, ObjectDescriptor
 from robot_layouts.experts.geometry import turn
+from robot_layouts.experts.grips import swings
 from robot_layouts.experts.hands import Hand
 from robot_layouts.experts.holds import SPLAYED, Hold, Holds, holds_of
 from robot_layouts.experts.player import StuckError
@@ -47,6 +48,7 @@ NEAR, READY, PASSING = 0.006, 0.008, 0.02
 GRASPED, HELD, PUSHED, SETTLED = 150, 20, 100, 15
 YAWS = tuple(sorted((k * pi / 8 for k in range(-7, 9)), key=abs))  # rad
 QUARTERS = (0.0, pi / 2, -pi / 2, pi)  # rad; ways in which what is square goes in
+SHUT = 0.005  # share of its opening from which on a gripper closes no further
 BACK = 0.05  # m; before a place, whence a thing or a gripper comes to it
 DRAWN = (0.0, 0.005, 0.01)  # m; by which fingers take a thing nearer to their tips
 MOVES = 5  # poses on the way of a joint that are checked
@@ -259,9 +261,21 @@ def taking(
     def held(scene: Scene) -> bool:
         return any(scene.grasps(hand.arm, each) for each in holds.bodies)
 
+    def firm(scene: Scene) -> bool:
+        return max(scene.pressure(hand.arm, each) for each in holds.bodies) > holds.pressing
+
     def pressed(scene: Scene) -> bool:
-        forces = (scene.pressure(hand.arm, each) for each in holds.bodies)
-        return held(scene) and max(forces) > holds.pressing
+        return held(scene) and (firm(scene) or hand.share(scene) < SHUT)
+
+    def kept(scene: Scene) -> float:
+        return 0.0 if firm(scene) else holds.holding
+
+    def closed(scene: Scene) -> float:
+        ((hold, _),) = chosen
+        if not swings(hand.motion, hold.grasp.opening):
+            return 1.0
+        end = hand.motion.share(hold.grasp.opening)
+        return float(np.clip((hold.share - hand.share(scene)) / (hold.share - end), 0.0, 1.0))
 
     return (
         Waypoint(
@@ -279,8 +293,15 @@ def taking(
             near=pi,
             until=pressed,
             most=GRASPED,
+            progress=closed,
         ),
-        Waypoint(f"hold {body}", squeeze=holds.holding, steps=4, until=held, most=HELD),
+        Waypoint(
+            f"hold {body}",
+            squeeze=kept if hand.quick else holds.holding,
+            steps=4,
+            until=held,
+            most=HELD,
+        ),
     )
 
 

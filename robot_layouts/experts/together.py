@@ -214,7 +214,9 @@ def _from_side(
     for within in SIDES:
         some = [hold for hold, at in zip(steep, along, strict=True) if at >= max(along) - within]
         try:
-            return taken(task, hand, scene, holds, some, back=BACK, up=by, count=3, besides=others)
+            return taken(
+                task, hand, scene, holds, some, back=BACK, up=by, count=OFFERED, besides=others
+            )
         except StuckError as error:
             reason = error
     raise reason
@@ -291,12 +293,16 @@ class _Rendezvous:
         body: Pose of the thing, (4, 4) (m).
         grip: Of the giver's gripper in its TCP link's frame, (4, 4) (m).
         released: How far the giver's gripper opens when it lets go, from 0 to 1.
+        hold: The taker's grasp.
+        take: The taker's posture, (dof,) (rad, m).
     """
 
     give: Floats
     body: Floats
     grip: Floats
     released: float
+    hold: Hold
+    take: Floats
 
 
 class _Passing:
@@ -398,12 +404,16 @@ class _Passing:
 
     def take(self, scene: Scene) -> tuple[Hold, Floats]:
         """Return the taker's grasp of the thing as it is held out now, and its posture there."""
-        assert self._meeting is not None
+        meeting = self._meeting
+        assert meeting is not None
+        if not any(scene.grasps(self.giver.arm, each) for each in self._givers.bodies):
+            raise StuckError(f"{self.giver.arm!r} has lost {self._body} on its way")
         self._off = CLOSER / 2  # less than was planned with, as hands are where they are by now
         now, body = self.giver.qpos(scene), pose_matrix(*scene.body(self._body))
-        grip = self.giver.link(now[None])[0] @ self._meeting.grip
+        grip = self.giver.link(now[None])[0] @ meeting.grip
+        planned = meeting.hold, meeting.take
         _, hold, posture = self._take(
-            scene, now[None], body[None], grip[None], np.zeros(1), self._meeting.released
+            scene, now[None], body[None], grip[None], np.zeros(1), meeting.released, planned
         )
         return hold, posture
 
@@ -438,8 +448,9 @@ class _Passing:
             qpos = giver.opened(qpos, giver.motion.share(own.grasp.opening))
         links = giver.link(qpos)
         released = own.share if own else max(hold.share for hold in self._givers.each)
-        number, _, _ = self._take(scene, qpos, links @ in_hand, links @ grip, ways[best], released)
-        return _Rendezvous(qpos[number], (links @ in_hand)[number], grip, released)
+        bodies, grips = links @ in_hand, links @ grip
+        number, hold, take = self._take(scene, qpos, bodies, grips, ways[best], released)
+        return _Rendezvous(qpos[number], bodies[number], grip, released, hold, take)
 
     def _take(
         self,
@@ -449,6 +460,7 @@ class _Passing:
         grips: Floats,
         ways: Floats,
         released: float,
+        planned: tuple[Hold, Floats] | None = None,
     ) -> tuple[int, Hold, Floats]:
         """Return which of some postures the giver gives from, the taker's grasp, and its posture.
 
@@ -459,6 +471,7 @@ class _Passing:
             grips: Poses of the giver's gripper then, (n, 4, 4) (m).
             ways: How far the giver has to go there, (n,) (rad).
             released: How far the giver's gripper opens when it lets go, from 0 to 1.
+            planned: The taker's grasp and posture that are looked at first, if they are in reach.
 
         Raises:
             StuckError: If the taker can take it in none of them; says why.
@@ -482,23 +495,38 @@ class _Passing:
             )
             for cost, row, hold, posture, off in self._reached(rows, now)
         ]
+        if planned is not None:
+            hold, posture = planned
+            pose = bodies[0] @ hold.own
+            near = taker.reach(
+                pose[None, :3, 3], pose[None, :3, :3], hold.pads, posture[None], scatter=False
+            )
+            found += [(-np.inf, 0, hold, qpos) for qpos in near.qpos]
         if not found:
             raise StuckError(f"{taker.arm!r} cannot reach {name} where {giver.arm!r} can give it")
         look = Look(self._task, scene, [name], {taker.owner: now})
         without = Look(self._task, scene, [], {taker.owner: now}, carried=name)
-        closely = 0
-        for row, own, posture in islice(_spread(found), MEETINGS):
-            if closely >= CLOSELY:
+        both = giver.links | taker.links
+        closely, tried, crossed = 0, 0, set[int]()
+        for row, own, posture in _spread(found):
+            if closely >= CLOSELY or tried >= MEETINGS:
                 break
+            if id(own) in crossed:  # whichever way the arms come
+                continue
+            tried += 1
             body = bodies[row]
             moved = {name: (body[:3, 3], quaternion_of(body[:3, :3]))}
             gives_it = gives[row], giver.opened(gives[row], released)
+            hands_cross = True
             for hold in (own, own.opened(taker, WIDER)):
                 closed = taker.motion.share(hold.grasp.opening)
                 at, shut = (taker.opened(posture, share) for share in (hold.share, closed))
                 hands = (self._both(give, take) for give in gives_it for take in (at, shut))
-                if without.overlap(hands) is not None:
+                overlap = without.overlap(hands)
+                if overlap is not None:
+                    hands_cross &= {overlap.one.name, overlap.other.name} <= both
                     continue
+                hands_cross = False
                 closely += 1
                 way = self._on_the_way(scene, hold, body @ hold.own, grips[row], at)
                 off = [*way[2:], *taker.opened(way[2:], closed)]
@@ -508,6 +536,8 @@ class _Passing:
                     and without.overlap(self._both(gives[row], q) for q in off) is None
                 ):
                     return row, hold, at
+            if hands_cross:
+                crossed.add(id(own))
         raise StuckError(
             f"wherever {taker.arm!r} could take {name} from {giver.arm!r}, something is in the way"
         )

@@ -109,6 +109,21 @@ def test_a_gripper_that_opens_for_no_grasp_says_so():
         grasp(env, "arm", "mug", wide)
 
 
+class Walled(MultiRobotTask):
+    layout = Layout({"arm": Placement("so101", (-0.36, 0.0, 0.0))})
+    max_episode_steps = 200
+    box = Object("box", spawn=Area(x=-0.1, y=0.0, yaw=0.4))
+
+    def evaluate(self, state):
+        """Success: the arm holds it above the table."""
+        return {"success": (state.position("box")[:, 2] > 0.02) & state.is_grasping("arm", "box")}
+
+
+def test_jaws_that_swing_close_on_a_thin_wall_without_pushing_it_away():
+    env, box = made(Walled), load("box")
+    played(env, {"arm": (*grasp(env, "arm", "box", box), *lift(env, "arm", "box", 0.04))})
+
+
 class Far(OneArm):
     mug = Object("mug", spawn=Area(x=0.3, y=0.5))
 
