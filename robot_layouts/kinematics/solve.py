@@ -313,7 +313,8 @@ def descend_by_differences(
         limits: Between which they stay, (joints, 2) (rad, m); None if anywhere will do.
     """
     joints = start.astype(float)
-    low, high = (-np.inf, np.inf) if limits is None else limits[list(free)].T
+    bounds = np.tile((-np.inf, np.inf), (len(start), 1)) if limits is None else limits
+    low, high = bounds[list(free)].T
     for _ in range(_DIFFERENCE_STEPS):
         error = errors(joints)
         slopes = np.zeros((len(error), len(free)))
@@ -321,8 +322,8 @@ def descend_by_differences(
             moved = joints.copy()
             moved[joint] += _DIFFERENCE
             slopes[:, column] = (errors(moved) - error) / _DIFFERENCE
-        if limits is not None:  # a joint at one that it is drawn beyond leaves the way to others
-            slopes *= _inward(-error @ slopes, joints[free], low, high)
+        # A joint at a limit that it is drawn beyond leaves the way to the others.
+        slopes *= _inward(-error @ slopes, joints[free], low, high)
         step = np.linalg.lstsq(slopes, -error, rcond=None)[0]
         joints[free] += np.clip(step, -_LONGEST_DIFFERENCE_STEP, _LONGEST_DIFFERENCE_STEP)
         joints[free] = np.clip(joints[free], low, high)
