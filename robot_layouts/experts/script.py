@@ -143,6 +143,8 @@ class Waypoint:
             works that out from the scene at every step.
         progress: How much of its way the arm is to have gone, from 0 to 1, worked out from the
             scene at every step; without it, it goes as fast as it can.
+        pace: Share of its greatest speed at which the arm moves at most, as long as its gripper
+            goes on like this.
     """
 
     name: str
@@ -159,6 +161,7 @@ class Waypoint:
     share: Share | None = None
     squeeze: float | Callable[[Scene], float] | None = None
     progress: Callable[[Scene], float] | None = None
+    pace: float = 1.0
 
 
 Script = Mapping[str, Sequence[Waypoint]]
