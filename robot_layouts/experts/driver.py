@@ -13,8 +13,6 @@ from robots.gripper_motion import gripper_motion
 
 GAIN = 2.0  # of the joint error at most; a Panda's drives follow 0.4 of a target in one step
 PEAK = 2 / np.e  # of a critically damped drive's speed, as a share of stiffness over damping
-GENTLY = 0.25  # of their speed, with what quick fingers hold, since each step of an arm shakes it
-QUICK = 2.0  # times that quick drives nearly settle in a control step
 _LEAST_DAMPING = 1e-9  # N·m·s/rad; of drives that have none
 
 
@@ -28,7 +26,6 @@ class ArmDriver:
         self._arm_joints = descriptor.arm_joints
         self._groups = dict(descriptor.action_split.groups)
         self._descriptor = descriptor
-        self._carrying = GENTLY if has_quick_fingers(descriptor, seconds) else 1.0
 
     def arm(self, qpos: Floats) -> Floats:
         """Pick the arm's joints out of all joints in the descriptor's order, (dof,)."""
@@ -41,6 +38,7 @@ class ArmDriver:
         qpos: Floats,
         share: float | None = None,
         squeeze: float | None = None,
+        pace: float = 1.0,
     ) -> Floats:
         """Return the action numbers, arm joints slowed alike so that they arrive together.
 
@@ -50,6 +48,7 @@ class ArmDriver:
             qpos: All joints now, in the descriptor's order, (dof,) (rad, m).
             share: Instead of ``gripper``, how far it is to be open, from 0 to 1.
             squeeze: Instead of both, the force with which its fingers are to close (N).
+            pace: Share of their greatest speed at which joints move.
         """
         goals = dict(zip(self._arm_joints, goal, strict=True))
         if squeeze is not None:
@@ -64,7 +63,8 @@ class ArmDriver:
             elif group.mimic:
                 parts.append(self._opening(group, goals))
             else:
-                parts.append(self._towards(group, goals, qpos, holding=squeeze is not None))
+                slower = self._gain(group) / GAIN if squeeze is not None else 1.0
+                parts.append(self._towards(group, goals, qpos, pace * slower))
         return np.concatenate(parts)
 
     def _gain(self, group: JointGroup) -> Floats:
@@ -101,29 +101,13 @@ class ArmDriver:
         return np.clip([(2 * value - high - low) / (high - low)], -1.0, 1.0)
 
     def _towards(
-        self, group: JointGroup, goals: Mapping[str, float], qpos: Floats, *, holding: bool
+        self, group: JointGroup, goals: Mapping[str, float], qpos: Floats, most: Floats | float
     ) -> Floats:
-        """Return a group's numbers; quick drives go slower with something in the hand."""
+        """Return a group's numbers, the largest of which are as large as asked for."""
         target = np.array([goals[joint] for joint in group.joints])
         low, high = np.array(group.ranges).T
         if not group.delta:
             return (2 * target - high - low) / (high - low)
         error = target - qpos[[self._place[joint] for joint in group.joints]]
-        gain = self._gain(group)
-        numbers = (2 * gain * error - high - low) / (high - low)
-        most = self._carrying * gain / GAIN if holding else np.ones(group.size)
+        numbers = (2 * self._gain(group) * error - high - low) / (high - low)
         return numbers / max(1.0, (np.abs(numbers) / most).max())
-
-
-def has_quick_fingers(robot: RobotDescriptor, seconds: float) -> bool:
-    """Return whether fingers are where they are driven to after each control step.
-
-    Args:
-        robot: A robot or a limb.
-        seconds: How long a control step takes (s).
-    """
-    return all(
-        np.min(group.stiffness) * seconds > QUICK * np.max(group.damping)
-        for name, group in robot.action_split.groups.items()
-        if is_gripper(name) and group.size
-    )

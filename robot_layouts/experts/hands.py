@@ -8,7 +8,6 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_layouts.experts.driver import has_quick_fingers
 from robot_layouts.experts.grips import MIDDLE_DEPTHS, Grip, grip_of, swings
 from robot_layouts.experts.script import Scene
 from robot_layouts.kinematics.rotations import (
@@ -18,6 +17,7 @@ from robot_layouts.kinematics.rotations import (
     rotation_about,
 )
 from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
+from robots.action_split import is_gripper
 from robots.gripper_motion import aiming_joints, gripper_motion, link_tree, wrist_of
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
@@ -29,6 +29,7 @@ TURN_WORTH = 0.02  # m that a turn by 1 rad is worth to an arm of fewer joints
 FIRST_ITERATIONS, ITERATIONS = 12, 30
 NEAR, NEAR_TURN = 0.1, 0.8  # m and rad from a goal after the first of them
 RANDOM_STARTS = 3
+QUICK = 2.0  # times that quick drives nearly settle in a control step
 FIRMNESSES = (1.0, 2.5)  # factors on the force with which a cube is held; the first that suffices
 CLOSING, STEP = 60.0, 4e-4  # N with which fingers close, at least; m per step, at least
 YIELD = 6e-5  # m that quick fingers are driven into what they hold, at least
@@ -99,8 +100,12 @@ class Hand:
         self._aiming = [robot.joints.index(joint) for joint in aiming_joints(robot, own)]
         few = len(self._aiming) < FULL
         self._turn, self._worth = (ROUGH_TURN, TURN_WORTH) if few else (TURN, 1.0)
-        self._simulator = task.scenario.simulator
-        self.quick = has_quick_fingers(own, 1 / task.scenario.control_frequency)
+        self._simulator, seconds = task.scenario.simulator, 1 / task.scenario.control_frequency
+        self.quick = all(
+            np.min(group.stiffness) * seconds > QUICK * np.max(group.damping)
+            for name, group in own.action_split.groups.items()
+            if is_gripper(name) and group.size
+        )
         self._random = scattered(self._tree.limits[self._aiming], RANDOM_STARTS)
 
     def grip(

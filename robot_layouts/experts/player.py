@@ -96,6 +96,7 @@ class Player:
         self._gripper: float = OPEN
         self._share: float | None = None
         self._squeeze: float | Callable[[Scene], float] | None = None
+        self._pace = 1.0
         self._leading = np.zeros_like(self._goal)
         self._current: Waypoint | None = None
         self._begun = self._elapsed = 0  # waypoints begun; steps taken in the current one
@@ -155,7 +156,7 @@ class Player:
             squeeze = squeeze(scene)
         if self._jaws is not None and share is None and squeeze is None:
             share, squeeze = self._jaws.move(self._gripper, scene)
-        return self._driver.action(goal, self._gripper, qpos, share, squeeze)
+        return self._driver.action(goal, self._gripper, qpos, share, squeeze, self._pace)
 
     def _lead(self, goal: Floats, scene: Scene) -> Floats | float:
         """Return how far beyond a goal an arm is driven, so that its weight does not hold it off.
@@ -239,6 +240,7 @@ class Player:
         if waypoint.gripper is not None:
             share = waypoint.share(scene) if callable(waypoint.share) else waypoint.share
             self._gripper, self._share, self._squeeze = waypoint.gripper, share, waypoint.squeeze
+            self._pace = waypoint.pace
         if waypoint.pushes:
             self._stroke = self._left(scene)
         self._begun, self._elapsed = self._begun + 1, 0

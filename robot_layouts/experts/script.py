@@ -145,6 +145,8 @@ class Waypoint:
             scene at every step; without it, it goes as fast as it can.
         pushes: Whether the TCP pushes a body that slides: it goes no quicker than that this slides
             on about as far as the waypoint leads, and must come near its end.
+        pace: Share of its greatest speed at which the arm moves at most, as long as its gripper
+            goes on like this.
     """
 
     name: str
@@ -162,6 +164,7 @@ class Waypoint:
     squeeze: float | Callable[[Scene], float] | None = None
     progress: Callable[[Scene], float] | None = None
     pushes: bool = False
+    pace: float = 1.0
 
 
 Script = Mapping[str, Sequence[Waypoint]]

@@ -48,6 +48,7 @@ NEAR, READY, PASSING = 0.006, 0.008, 0.02
 GRASPED, HELD, PUSHED, SETTLED = 150, 20, 100, 15
 YAWS = tuple(sorted((k * pi / 8 for k in range(-7, 9)), key=abs))  # rad
 QUARTERS = (0.0, pi / 2, -pi / 2, pi)  # rad; ways in which what is square goes in
+GENTLY = 0.25  # of its speed, with what quick fingers hold, since each step of an arm shakes it
 SHUT = 0.005  # share of its opening from which on a gripper closes no further
 BACK = 0.05  # m; before a place, whence a thing or a gripper comes to it
 DRAWN = (0.0, 0.005, 0.01)  # m; by which fingers take a thing nearer to their tips
@@ -301,6 +302,7 @@ def taking(
             steps=4,
             until=held,
             most=HELD,
+            pace=GENTLY if hand.quick else 1.0,
         ),
     )
 

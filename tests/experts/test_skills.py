@@ -248,6 +248,21 @@ def test_a_giver_leaves_the_taker_a_grasp_where_hands_from_above_have_no_room():
     played(env, hand_over(env, "left", "right", "cup", load("cup")))
 
 
+class Bolt(TwoArms):
+    bolt = Object("bolt", spawn=Area(x=-0.1))
+
+    def evaluate(self, state):
+        """Success: the right arm alone holds it."""
+        alone = state.is_grasping("right", "bolt") & ~state.is_grasping("left", "bolt")
+        return {"success": alone & (state.tcp_distance("left", "bolt") > 0.08)}
+
+
+@pytest.mark.long
+def test_two_hands_find_each_other_at_a_thing_as_short_as_a_finger():
+    env = made(Bolt)
+    played(env, hand_over(env, "left", "right", "bolt", load("bolt")))
+
+
 class Together(TwoArms):
     tray = Object("tray", spawn=Area(x=-0.1, yaw=pi / 2))
 
