@@ -6,6 +6,7 @@ axes of its TCP link.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -45,6 +46,8 @@ class GripperMotion:
         angles: How far they are turned against each other there, from where they meet, (65,) (rad).
         turn: Orientation of the gripper's frame in the TCP link's, (3, 3): its y axis is the way in
             which the pads part at first, whatever `robots.Fingers` says of contact forces.
+        beyond: How far the fingers' shapes reach beyond the pads when closed, the way the gripper
+            points (m); 0 of fingers without shapes.
     """
 
     def __init__(self, robot: RobotDescriptor) -> None:
@@ -90,11 +93,14 @@ class GripperMotion:
         first, second = (poses[:, finger, :3, :3] for finger in fingers)
         self.angles = _turned(np.swapaxes(first, 1, 2) @ second)
         apart = np.linalg.norm(one - other, axis=1)
+        shapes = _shapes(robot, hand[0] @ poses[0, fingers])
         if self.angles.max() < _SLIDES:
-            apart = np.maximum(apart - _inside(robot, hand[0] @ poses[0, fingers], one - other), 0)
+            apart = np.maximum(apart - _inside(shapes, one - other), 0)
         self.openings = apart
         wrist = transform(hand[0], poses[0, wrist_of(robot, tree), :3, 3])
         self.turn = _axes(self._middles[0] - wrist, (one - other)[_AJAR])
+        ahead = [(corners - self._middles[0]) @ self.turn[:, 2] for corners in shapes]
+        self.beyond = max((float(along.max()) for along in ahead), default=0.0)
 
     @property
     def widest(self) -> float:
@@ -150,23 +156,32 @@ class GripperMotion:
         return np.asarray(self._ends[:, 0] + shares[:, None] * self._travels)
 
 
-def _inside(robot: RobotDescriptor, closed: Floats, apart: Floats) -> float:
+def _shapes(robot: RobotDescriptor, closed: Floats) -> list[Floats]:
+    """Return the corners of the shapes of each finger that has any, (n, 3) (m).
+
+    Args:
+        robot: Whose fingers they are.
+        closed: Poses of the two links, (2, 4, 4) (m).
+    """
+    assert robot.fingers is not None
+    solids, urdf = _model(robot).collisions, robot.urdf.locate()
+    return [
+        transform(pose, np.concatenate([shape_corners(shape, urdf) for shape in solids[link]]))
+        for pose, link in zip(closed, robot.fingers.links, strict=True)
+        if solids.get(link)
+    ]
+
+
+def _inside(shapes: Sequence[Floats], apart: Floats) -> float:
     """Return how far the shapes of two jaws are inside each other when closed, if they are (m).
 
     Args:
-        robot: Whose fingers are the jaws.
-        closed: Poses of the two links then, (2, 4, 4) (m).
+        shapes: Their corners, for each jaw (m).
         apart: From the second pad to the first as they slide apart, (shares, 3) (m).
     """
-    assert robot.fingers is not None
-    model, urdf, way = _model(robot), robot.urdf.locate(), _unit(apart[-1])
-    shapes = [model.collisions.get(link, ()) for link in robot.fingers.links]
-    if not all(shapes):
+    if len(shapes) != 2:
         return 0.0
-    one, other = (
-        np.concatenate([transform(pose, shape_corners(shape, urdf)) for shape in solid]) @ way
-        for pose, solid in zip(closed, shapes, strict=True)
-    )
+    one, other = (corners @ _unit(apart[-1]) for corners in shapes)
     deep = float(other.max() - one.min())
     return deep if _TOUCH < deep < np.linalg.norm(apart[-1]) else 0.0
 

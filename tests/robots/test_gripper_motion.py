@@ -31,6 +31,12 @@ def test_jaws_whose_shapes_meet_before_their_joints_stop_open_from_there():
     assert at == pytest.approx([0.0, 0.0, 0.03, 0.09], abs=1e-4)
 
 
+def test_how_far_fingers_reach_beyond_the_place_where_they_hold_things():
+    """A Fetch's TCP lies in the middle of pads of 6 cm, and what points the other way is none."""
+    assert gripper_motion(load("panda")).beyond == pytest.approx(0.0095, abs=1e-4)  # m
+    assert gripper_motion(load("fetch")).beyond == pytest.approx(0.031, abs=1e-4)
+
+
 @pytest.mark.parametrize(
     "name", ["panda", "so100", "koch", pytest.param("baxter", marks=pytest.mark.long)]
 )

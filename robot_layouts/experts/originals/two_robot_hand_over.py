@@ -41,6 +41,9 @@ GIVER, TAKER, CUBE, GOAL = "left", "right", "cube", "goal_site"
 # that hold more than their own half hold it by different faces. Those of one body come from the
 # same side, across each other's fingers, and hold it by its edge first.
 DEPTHS, EDGE = (0.2, -0.1, -0.35), 0.4
+# The same: how far fingers may reach beyond that, little more than a Panda's. What reaches farther
+# first holds the cube by as much less as it is beyond the second, so that two hands have room.
+BEYOND, TIPS = 0.3, 0.15
 OWN_HALF = 0.1  # the least depth at which each holds its own half
 NEAR = 0.3  # how far from its place a gripper may be when it closes or waits
 BEFORE = 3  # times as far it may be from where it begins to come to the cube
@@ -230,20 +233,23 @@ class _Search:
     def _grips(self, hand: Hand, *depths: float) -> Iterator[tuple[Grip, float]]:
         """Yield how a hand holds the cube, at the depths at which it does, in their order.
 
-        It is held more firmly only if it would be lost at all of them.
+        Fingers that reach far are tried with their tips first. It is held more firmly only if it
+        would be lost there.
 
         Raises:
             TaskError: If it does at none.
         """
+        beyond = hand.motion.beyond / self._edge
+        more = beyond - TIPS if beyond > BEYOND else 0.0
         found = False
-        for firmness in FIRMNESSES:
-            for depth in depths:
-                if (grip := hand.grip(self._edge, depth, firmness)) is not None:
+        tips = [(depth + more, depth) for depth in depths if more and depth == self._depths[0]]
+        for at, depth in (*tips, *zip(depths, depths, strict=True)):
+            for firmness in FIRMNESSES:
+                if (grip := hand.grip(self._edge, at, firmness)) is not None:
                     found = True
                     yield grip, depth
-            if found:
-                break
-        else:
+                    break
+        if not found:
             raise TaskError(
                 f"the gripper of {hand.arm!r} closes on a cube of {1e3 * self._edge:.3g} mm without"
                 " holding it; robot-layouts robots inspect ROBOT --try says how it grasps"
