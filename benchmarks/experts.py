@@ -194,9 +194,10 @@ def _handed_over(pairs: Record, seeds: int) -> Iterator[None]:
     """Play what the record of pairs lacks, and yield after every episode."""
     for names in (*PAIRS, *BODIES):
         label = names if isinstance(names, str) else ", ".join(names)
-        seen = pairs.setdefault(label, {"episodes": {}})
+        seen = pairs.get(label, {"episodes": {}})
         if len(seen["episodes"]) >= seeds or "error" in seen:
             continue
+        pairs[label] = seen
         try:
             task = _standing(names)
         except RobotLayoutsError as error:

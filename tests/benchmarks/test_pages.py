@@ -30,7 +30,7 @@ COMMANDS = {
     "mjcf": ["mjcfs", "--render"],
     "placing": ["placing"],
     "objects": ["objects", "--objects", "mug"],  # which needs no package
-    "experts": ["experts", "--tasks"],
+    "experts": ["experts", "--tasks", "--pair-seeds", "0"],
     "cells_robots": ["cells", "--tasks"],
     "engines": ["engines", "--tasks"],
     "device": ["agreement", "--tasks"],
