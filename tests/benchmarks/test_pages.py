@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from benchmarks.__main__ import main
-from benchmarks.experts import PAIRS, TASKS
+from benchmarks.experts import BODIES, PAIRS, TASKS
 from benchmarks.ladder import FIRST_TEST, OWN
 from benchmarks.objects import NAMES, digest_of, kind_of
 from benchmarks.placing import CELLS, targets_of
@@ -147,7 +147,7 @@ def test_what_the_page_of_cells_promises():
 
 def test_what_the_page_of_experts_promises_of_pairs():
     pairs = record("experts")["pairs"]
-    assert list(pairs) == [f"{left}, {right}" for left, right in PAIRS]
+    assert pairs.keys() <= {*(", ".join(pair) for pair in PAIRS), *BODIES}
     for hand in ("panda", "so100", "so101"):
         episodes = pairs[f"{hand}, {hand}"]["episodes"].values()
         assert sum(episode["success"] for episode in episodes) >= 8, hand

@@ -3,6 +3,7 @@
 `make faults` tries several hundred more; see `tests.faults.recording_h5_faults` and its neighbours.
 """
 
+import mmap
 import os
 import struct
 import threading
@@ -111,7 +112,8 @@ def take_memory():
     kept = []
     with limited(60):
         while len(kept) < 2**12:
-            kept.append(bytearray(2**16))
+            kept.append(mmap.mmap(-1, 2**16))  # no room that was left when something else went
+            kept[-1].write(bytes(2**16))
             time.sleep(0.001)
 
 
