@@ -186,7 +186,7 @@ def _moved(
         x, y = (round(m + (at - m) * factor, 4) for m, at in zip(middle, flat, strict=True))
         turned = faced(robot, placement.facing)
         moved = replace(moved, position=(x, y, z), quaternion=turned, rpy=None)
-    elif placement.on in layout.frames and factor != 1.0:
+    elif _table_of(layout, placement) and factor != 1.0:
         (x, y), turned = flat, inverted(layout.frame_poses[placement.on].quaternion)
         way = rotated(turned, ((x - middle[0]) * (factor - 1), (y - middle[1]) * (factor - 1), 0.0))
         along = zip(placement.local_pose.position, way, strict=True)
@@ -244,12 +244,17 @@ def _roles(robot: RobotDescriptor, places: Sequence[str]) -> dict[str, str]:
     return dict(zip(places, from_left, strict=False))
 
 
+def _table_of(layout: Layout, placement: Placement) -> str:
+    """Return the table at an edge of which a robot stands; empty if it stands at none."""
+    table, edge, _ = (placement.on or "").rpartition(".")
+    return table if edge and placement.on in layout.frames and table in layout.frames else ""
+
+
 def _middle(layout: Layout) -> Point:
     """Return the middle of what the robots of a task's layout work on, x and y (m)."""
-    edges = {str(placement.on) for placement in layout.values()}
-    tables = {edge.partition(".")[0] for edge in edges & layout.frames.keys()}
-    if len(tables) == 1 and edges <= layout.frames.keys():
-        return layout.frame_poses[tables.pop()].position[:2]
+    tables = {_table_of(layout, placement) for placement in layout.values()}
+    if len(tables) == 1 and (table := tables.pop()):
+        return layout.frame_poses[table].position[:2]
     x, y = (
         sum(along) / len(layout)
         for along in zip(

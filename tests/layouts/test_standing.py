@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from layouts import Layout, Placement, around_table, at_task, face_to_face, ring, single
+from layouts.frames import Frame
 from layouts.ready import drawn_back
 from layouts.shared_place import SHARES_DOWN, working_reaches
 from robots import AssetError, LayoutError, RobotRegistry, UnknownNameError
@@ -160,6 +161,13 @@ def test_small_arms_on_edges_of_a_table_stand_nearer_to_its_middle():
         own = np.array(edges[name].base_position)
         np.testing.assert_allclose(placement.base_position, share * own, atol=2e-4)
     assert at_task("panda_wristcam", edges)["a"].base_pose == edges["a"].base_pose
+
+
+def test_robots_on_a_frame_that_is_no_table_stay_on_it():
+    wall = {"wall": Frame((-0.8, 0.0, 0.0))}
+    places = {n: Placement("panda", (0.0, y, 0.4), on="wall") for n, y in (("a", 0.3), ("b", -0.3))}
+    for name, placement in at_task("so101", Layout(places, wall)).items():
+        assert placement.base_position == Layout(places, wall)[name].base_position
 
 
 def test_what_does_not_fit_is_refused():
