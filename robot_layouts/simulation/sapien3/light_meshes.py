@@ -35,6 +35,7 @@ _FEW = 200  # triangles of a connected piece, which stays as it is
 _WORTH = 0.8  # of a file's triangles; if more would be left, it is drawn as it is
 _UNIT = 1e-3  # m; the decimation's thresholds are made for millimetres
 _CREASE = np.cos(np.radians(35))  # between faces that are shaded as one smooth surface
+_TOGETHER = 256  # points whose triangles are looked at at once, so few that they stay in the cache
 _NEAREST = 30  # triangles that are looked at for each point; long ones lie side by side
 _POINTS = (100, 20_000, 2e-6)  # of a surface: fewest, most, and the area of each (m²)
 _PLACES = (1000, 60_000, 1e-6)  # by which the nearest triangles are found, likewise
@@ -216,9 +217,13 @@ def _away(surface: Surface, other: Surface, right: NDArray[np.bool_] | None = No
     triangle = np.concatenate([triangle, np.arange(len(mesh.faces))])
     near: Any = KDTree(places).query(points, _NEAREST)[1]
     near = triangle[np.minimum(near, len(triangle) - 1)]
-    corners, repeated = mesh.triangles[near].reshape(-1, 3, 3), points.repeat(_NEAREST, axis=0)
-    closest: Any = trimesh.triangles.closest_point(corners, repeated)
-    gaps = np.linalg.norm(closest - repeated, axis=1).reshape(-1, _NEAREST)
+    gaps = np.empty(near.shape)
+    for start in range(0, len(points), _TOGETHER):
+        block = slice(start, start + _TOGETHER)
+        corners = mesh.triangles[near[block]].reshape(-1, 3, 3)
+        repeated = points[block].repeat(_NEAREST, axis=0)
+        closest: Any = trimesh.triangles.closest_point(corners, repeated)
+        gaps[block] = np.linalg.norm(closest - repeated, axis=1).reshape(-1, _NEAREST)
     nearest, count = gaps.min(1), len(surface[1])
     if right is not None:
         nearest[~right[near[np.arange(len(gaps)), gaps.argmin(1)]]] = np.inf
