@@ -55,11 +55,13 @@ from robots import (
 from robots.descriptor import Vector3
 
 if TYPE_CHECKING:
-    from layouts.validation.findings import Finding
+    from layouts.validation.report import Report
 
 Distance = float | Literal["auto"]  # m
 
 FARTHEST = 3.0  # m; as much farther apart than by their reach robots stand at most
+START = 0.05  # m; what is left between robots as they start, so that hands can set out
+LEAST = 0.01  # m; by which they are moved apart at least
 
 # Of the shorter reach: how deep within reach of neighbours the places lie that they share, how near
 # the ground they are, both as those of two Pandas; in which steps robots are moved together for
@@ -378,15 +380,25 @@ def _sound(placed: Callable[[float], Layout], neighbours: Sequence[tuple[str, st
 
     more = _more_to_share(raised, neighbours)
     layout = raised(more)
-    while found := _problems(layout, "collision"):
-        more += max(finding.farther or FARTHEST for finding in found)
+    while farther := _farther(report := layout.validate(workspaces=False, samples=20)):
+        more += farther
         if more >= FARTHEST:
-            raise LayoutError(f"no distance keeps these robots apart\n{found[0]}")
+            first = [str(finding) for finding in report.findings[:1]]
+            raise LayoutError("\n".join(["no distance keeps these robots apart", *first]))
         layout = raised(more)
-    for finding in _problems(layout, "self-collision", "joint limit", "table", samples=0):
-        if not all(in_catalogue(layout[name].robot) for name in finding.robots):
-            raise LayoutError(f"no distance makes this layout sound\n{finding}")
+    for finding in layout.validate(workspaces=False, samples=0).findings:
+        if finding.serious and finding.kind in ("self-collision", "joint limit", "table"):
+            if not all(in_catalogue(layout[name].robot) for name in finding.robots):
+                raise LayoutError(f"no distance makes this layout sound\n{finding}")
     return layout
+
+
+def _farther(report: Report) -> float:
+    """Return by how much farther apart robots have to stand (m); 0 if all are far enough apart."""
+    collisions = [found for found in report.findings if found.kind == "collision"]
+    near = [START - pair.noisy_distance for pair in report.clearances if not pair.table]
+    farther = max((*(found.farther or FARTHEST for found in collisions), *near), default=0.0)
+    return max(farther, LEAST) if farther > 0 else 0.0
 
 
 def _more_to_share(
@@ -412,11 +424,6 @@ def _more_to_share(
         if all(share(layout, pair) for pair in neighbours):
             return more
     return 0.0
-
-
-def _problems(layout: Layout, *kinds: str, samples: int = 20) -> list[Finding]:
-    report = layout.validate(workspaces=False, samples=samples)
-    return [finding for finding in report.findings if finding.serious and finding.kind in kinds]
 
 
 def _is_auto(distance: object) -> TypeGuard[Literal["auto"]]:

@@ -91,7 +91,7 @@ def test_bodies_that_are_larger_than_their_reach_stand_farther_apart(way, tmp_pa
     assert 0 < (x - u) ** 2 + (y - v) ** 2 < 3.0**2
 
 
-def test_the_distance_is_that_of_the_finding(tmp_path):
+def test_the_distance_is_that_of_the_finding_and_leaves_hands_room_to_set_out(tmp_path):
     robots = {"left": wide(tmp_path), "right": "panda"}
     reach = apart(robots["left"], RobotRegistry.load("panda"))
     by_reach = side_by_side(robots, spacing=reach)
@@ -100,7 +100,9 @@ def test_the_distance_is_that_of_the_finding(tmp_path):
     assert f"{finding.farther:.3f} m farther apart" in finding.advice
     layout = side_by_side(robots, spacing="auto")
     left, right = (place.base_position[1] for place in layout.values())
-    assert right - left == pytest.approx(reach + finding.farther, abs=1e-12)
+    assert right - left >= reach + finding.farther
+    (clearance,) = layout.validate(workspaces=False, samples=20).clearances
+    assert CLEAR <= clearance.noisy_distance < CLEAR + 0.02
 
 
 def test_where_no_distance_helps_it_says_why(tmp_path):
