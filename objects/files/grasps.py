@@ -19,6 +19,7 @@ WIDEST, NARROWEST = 0.094, 0.003  # m; what fingers that part by 10 cm can be cl
 POINTS = 300  # on the surface that are tried
 _WAYS = 12  # round each of them, from which the gripper comes
 _OPPOSITE = np.cos(np.radians(12))  # between the two sides that are held
+_SLANTED = np.cos(np.radians(20))  # between each of them and how fingers close, where sides slope
 _GAP = 0.016  # m; where no finger fits between two parts, they are held together
 _SHALLOW = 0.006  # m; by which the tips of fingers may seem to be in the table
 _FROM_ABOVE = 0.3  # the sine of how far a gripper may come from below
@@ -49,6 +50,7 @@ def proposed(
     part: str = "body",
     most: int = MOST,
     points: int = POINTS,
+    slanted: bool = False,
 ) -> tuple[Grasp, ...]:
     """Return grasps of some convex shapes, well spread; the same ones each time.
 
@@ -63,13 +65,14 @@ def proposed(
         part: What is held, as `Grasp.part` has it.
         most: How many there may be.
         points: How many on the surface are tried.
+        slanted: Whether sides may slope, as those of a cone, so that friction has to keep them.
     """
     solids = [_solid(shape) for shape in everything if shape.collides]
     own = [_solid(shape) for shape in held if shape.collides]
     up = rotate(np.array(lying) * (1, -1, -1, -1), np.array([0.0, 0.0, 1.0]))
     table = min(float((surface(s).corners @ up).min()) for s in everything if s.collides)
     tried = list[tuple[float, Floats, Floats, float]]()
-    for middle, closing, width in _opposite(held, own, points):
+    for middle, closing, width in _opposite(held, own, points, slanted):
         aside = float(np.linalg.norm(np.cross(centre - middle, closing)))
         for approach in _around(closing):
             if approach @ up <= _FROM_ABOVE:
@@ -111,7 +114,7 @@ def _solid(shape: Shape) -> _Solid:
 
 
 def _opposite(
-    held: Sequence[Shape], solids: Sequence[_Solid], tried: int
+    held: Sequence[Shape], solids: Sequence[_Solid], tried: int, slanted: bool
 ) -> Iterator[tuple[Floats, Floats, float]]:
     """Yield the middle between opposite sides, the way in which fingers close, and the width."""
     shapes = [shape for shape in held if shape.collides]
@@ -122,9 +125,14 @@ def _opposite(
         points = sampled(surface(shape), count, random)
         sides = (points @ solid.normals.T - solid.offsets).argmax(axis=1)
         for point, normal in zip(points, solid.normals[sides], strict=True):
-            width, other = _through(point, -normal, solids)
-            if NARROWEST <= width <= WIDEST and other @ -normal >= _OPPOSITE:
-                yield point - normal * width / 2, normal, width
+            closing, limit = normal, _OPPOSITE
+            width, other = _through(point, -closing, solids)
+            if slanted and np.linalg.norm(normal - other) > 1:
+                closing, limit = (normal - other) / np.linalg.norm(normal - other), _SLANTED
+                width, other = _through(point, -closing, solids)
+            sides_met = min(normal @ closing, other @ -closing)
+            if NARROWEST <= width <= WIDEST and sides_met >= limit:
+                yield point - closing * width / 2, closing, width
 
 
 def _through(point: Floats, way: Floats, solids: Sequence[_Solid]) -> tuple[float, Floats]:

@@ -107,6 +107,8 @@ def _made(file: Path, options: tuple[str, float, str, int]) -> tuple[Made, Files
     grasps = proposed(hulls, hulls, centre, lying)
     if len(grasps) < _FEW:
         grasps = proposed(hulls, hulls, centre, lying, points=_MANY * POINTS)
+    if not grasps:
+        grasps = proposed(hulls, hulls, centre, lying, points=_MANY * POINTS, slanted=True)
     return Made([drawn, *hulls], grasps, rests=rests), {}
 
 

@@ -122,6 +122,15 @@ def test_grasps_have_opposite_sides_between_the_fingers_and_hold(tmp_path):
     assert holding(replace(thing, grasps=(beside, *held.grasps)), (0.07,)).grasps == held.grasps
 
 
+def test_a_cone_is_held_across_its_axis_by_friction(tmp_path):
+    cone = trimesh.creation.cone(0.025, 0.09)
+    thing = ObjectDescriptor.from_mesh(saved(tmp_path, "cone.stl", cone), density=400.0)
+    ways = [rotate(np.array(grasp.quaternion), np.array([0.0, 1.0, 0.0])) for grasp in thing.grasps]
+    assert len(ways) >= 20
+    assert np.abs(np.array(ways)[:, 2]).max() < 0.1
+    assert len(holding(thing, (0.07,)).grasps) >= 0.5 * len(thing.grasps)
+
+
 def test_what_is_hollow_needs_coacd_and_its_hull_does_not(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "coacd", None)  # as if it were not installed
     path = saved(tmp_path, "pipe.stl", trimesh.creation.annulus(0.03, 0.04, 0.08))
