@@ -57,7 +57,7 @@ _FOR_USERS = {
     "objects fetch": "objects.fetch:fetch",
     "objects show": "objects.picture:show",
     "new task": "tasks.new_task:new_task",
-    "new robot": "robots.new_robot:new_robot",
+    "new robot": "robots.from_urdf:new_robot",
 }
 _FOR_DEVELOPERS = {
     "portable": "robots.portable:portable",

@@ -47,7 +47,7 @@ from robots import (
     RobotRegistry,
     UnknownNameError,
 )
-from robots.assets.progress import size
+from robots.assets.store import size
 from robots.registry import CATALOGUE as ROBOTS
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf

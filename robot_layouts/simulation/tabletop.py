@@ -6,7 +6,7 @@ from math import cos, pi, sin
 
 from objects.shapes import Box, Floor, Mesh, Plane, Shape
 from robot_layouts.simulation.world import World
-from robots.assets import scenery
+from robots.assets.locator import GROUND_TEXTURE, TABLE
 
 # mani_skill 3.0.1, utils/scene_builder/table/scene_builder.py (m)
 TABLE_HEIGHT = 0.9196429
@@ -65,7 +65,7 @@ def add_table(world: World, *, textured: bool = True) -> None:
 
 def _table_mesh(*, textured: bool) -> tuple[Shape]:
     mesh = Mesh(
-        file=scenery.TABLE.locate(),
+        file=TABLE.locate(),
         scale=(MESH_SCALE, MESH_SCALE, MESH_SCALE),
         quaternion=TABLE_QUATERNION,
         textured=textured,
@@ -77,5 +77,5 @@ def _table_mesh(*, textured: bool) -> tuple[Shape]:
 
 def _floor() -> tuple[Shape]:
     # mani_skill 3.0.1, utils/building/ground.py
-    texture = scenery.GROUND_TEXTURE.locate()
+    texture = GROUND_TEXTURE.locate()
     return (Floor(texture=texture, position=(0.0, 0.0, GROUND_HEIGHT)),)

@@ -12,7 +12,7 @@ from robot_layouts.kinematics.rotations import Floats, transform
 from robot_layouts.motion.collision.broad_phase import CandidatePairs, Indices, seen_from
 from robot_layouts.motion.model.bodies import Bodies
 from robot_layouts.motion.model.link_poses import LinkPoses
-from robots.bodies.depth import overlap
+from robots.bodies.overlaps import overlap
 
 TOUCHING = 1e-5  # m; nearer bodies are asked whether they overlap, as everywhere else
 

@@ -27,16 +27,17 @@ from robot_layouts.simulation.backend import (
 from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.maths import Flags, Floats
 from robot_layouts.simulation.mujoco import mujoco
-from robot_layouts.simulation.mujoco.contacts import (
-    ArmWatcher,
-    ForceReader,
-    overlaps_in,
-    presses_on_object,
-)
 from robot_layouts.simulation.mujoco.drives import JointDrives
 from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, substeps_of
 from robot_layouts.simulation.mujoco.pictures import Pictures
-from robot_layouts.simulation.mujoco.world import MujocoWorld, extent_of
+from robot_layouts.simulation.mujoco.world import (
+    ArmWatcher,
+    ForceReader,
+    MujocoWorld,
+    extent_of,
+    overlaps_in,
+    presses_on_object,
+)
 from robot_layouts.simulation.physics import PhysicsSettings
 from robot_layouts.simulation.solvers import (
     TreeArm,
