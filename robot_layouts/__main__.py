@@ -54,7 +54,7 @@ _FOR_USERS = {
     "robots guess": "robots.from_urdf:print_guess",
     "objects list": "objects.inspect:list_objects",
     "objects inspect": "robot_layouts.simulation.checks.commands:inspect_objects",
-    "objects fetch": "objects.fetch:fetch",
+    "objects fetch": "objects.inspect:fetch",
     "objects show": "objects.picture:show",
     "new task": "tasks.new_task:new_task",
     "new robot": "robots.from_urdf:new_robot",

@@ -34,7 +34,7 @@ from benchmarks.records import (
 )
 from benchmarks.robots.judge import EXPECTED, Expected, expected_of, read_expectations
 from layouts import Layout
-from layouts.description import action_text, decimal, facing_text
+from layouts.preview import action_text, decimal, facing_text
 from parity.results import number_text as difference_text
 from parity.results import read_results
 from robot_layouts.core.writing import write_whole

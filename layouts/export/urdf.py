@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, ElementTree, SubElement, indent
 
-from layouts.export.files import expect_ending
-from robot_layouts.core.writing import written_whole
+import yaml
+
+from layouts.export.cell import ExportedCell, RobotSource, Standing
+from layouts.export.files import expect_ending, replaced_folder
+from layouts.export.meshes import MeshFolder, drawn_meshes
+from layouts.visuals import load_meshes
+from robot_layouts.core.writing import write_whole, written_whole
+from robot_layouts.kinematics.quaternions import quaternion_rpy
 from robots import RobotDescriptor
 from robots.assets.assembled import rename
 from robots.bodies.allowed import joined_pairs, read_allowed_pairs
 from robots.urdf.paths import resolve
 from robots.urdf.reading import model_of
-from robots.urdf.srdf import srdf_beside
-from robots.urdf.summary import root_of
+from robots.urdf.summary import root_of, srdf_beside
 from robots.urdf.text import joint_element, origin_at
-
-if TYPE_CHECKING:
-    from layouts.arrangement import Arrangement
-
-
-import math
-from itertools import count
-from typing import TYPE_CHECKING, Any
-
-import yaml
-
-from layouts.export.cell import ExportedCell, RobotSource, Standing
-from layouts.export.files import replaced_folder
-from layouts.export.meshes import MeshFolder, drawn_meshes
-from layouts.visuals import load_meshes
-from robot_layouts.core.writing import write_whole
-from robot_layouts.kinematics.quaternions import quaternion_rpy
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement

@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from robot_layouts.core.errors import AssetError
 from robot_layouts.core.quoting import shown
 from robot_layouts.kinematics.quaternions import quaternion_rpy
-from robot_layouts.kinematics.rotations import Floats, quaternion_of
 from robots.parts import Quaternion, Vector3
+
+if TYPE_CHECKING:
+    from robot_layouts.kinematics.rotations import Floats
 
 MAX_DEPTH = 100  # elements inside one another; the deepest Collada meshes have about 20
 
@@ -151,6 +153,8 @@ def origin_at(position: Vector3, quaternion: Quaternion) -> dict[str, str]:
 
 def origin_of(pose: Floats) -> dict[str, str]:
     """Return the attributes of the ``<origin>`` of a pose, (4, 4) (m)."""
+    from robot_layouts.kinematics.rotations import quaternion_of  # NumPy, for which others wait
+
     x, y, z = pose[:3, 3].tolist()
     a, b, c, d = quaternion_of(pose[:3, :3]).tolist()
     return origin_at((x, y, z), (a, b, c, d))

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from objects import ObjectDescriptor, ObjectRegistry
-from objects.fetch import fetch
+from objects.inspect import fetch
 from objects.packaged import MEASURED, PACKAGED, PackagedObject, measurements
 from objects.registry import CATALOGUE
 from robot_layouts.__main__ import main

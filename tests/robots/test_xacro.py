@@ -12,10 +12,9 @@ import trimesh
 
 from robot_layouts.__main__ import main
 from robots import AssetError, LocalUrdf, RobotDescriptor
-from robots.fingerprint import asset_fingerprint
 from robots.from_urdf import guess_descriptor
 from robots.urdf.cleaning.xacro_files import template_of, with_arguments
-from robots.urdf.summary import read_cleaned
+from robots.urdf.summary import asset_fingerprint, read_cleaned
 
 CHECKOUT = Path(__file__).parents[2]
 
