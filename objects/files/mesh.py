@@ -1,28 +1,34 @@
-"""Makes a thing of a mesh file: convex parts that collide, ways to rest, places to grasp."""
+"""Makes a thing of a mesh file: convex parts that collide, ways to rest, places to grasp.
+
+What was made of a file is kept in the local copy: the next process only reads it.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, fields, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from objects.descriptor import ObjectDescriptor
+from objects.descriptor import Grasp, NamedPoint, ObjectDescriptor
 from objects.family import Made
 from objects.files.convex import MOST_PARTS, convex_parts, hull_of, hull_volume
 from objects.files.grasps import POINTS, proposed
-from objects.files.remembering import Files, remembered
-from objects.shapes import GREY, Color, ConvexHull, Friction, Mesh, Place, Shape
+from objects.joints import Joint
+from objects.shapes import GREY, SIZED, Color, ConvexHull, Finish, Friction, Mesh, Place, Shape
 from objects.solids import mass_of
 from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole
 from robot_layouts.core.errors import AssetError, DescriptorError, UnreadableFileError
-from robot_layouts.core.files import read_regular
-from robot_layouts.core.paths import absolute
+from robot_layouts.core.files import read_regular, read_text
+from robot_layouts.core.paths import absolute, default_root
 from robot_layouts.kinematics.rotations import Floats, quaternion_about, rotate
+from robots.assets.assembled import write_folder
 from robots.descriptor import IDENTITY, Quaternion
 from robots.urdf.mesh_files import MAX_MESH_BYTES, load_scene
 
@@ -36,6 +42,13 @@ _TURNS: dict[str, Quaternion] = {  # from the file's frame to one whose z axis p
 }
 _WATER = 1000.0  # kg/m³
 _FEW, _MANY = 20, 8  # grasps, and how many times as many places are tried where there are fewer
+_VERSION = 2  # of what is made of files; another one makes them anew
+_FOLDER, _THING = "objects", "object.json"
+_LARGEST = 1 << 26  # bytes of what is kept
+_KINDS = {kind.__name__: kind for kind in SIZED}
+
+Files = Mapping[str, bytes]
+"""Contents by name, which the shapes of a thing refer to."""
 
 
 def thing_from_mesh(
@@ -215,3 +228,77 @@ def _turned(down: Floats) -> Quaternion:
     turn = quaternion_about(axis, np.arctan2(aside, -z)).tolist()
     w, i, j, k = (round(number, _DIGITS) + 0.0 for number in turn)
     return w, i, j, k
+
+
+def remembered(
+    contents: bytes, options: object, folder: Path | None, make: Callable[[], tuple[Made, Files]]
+) -> Made:
+    """Return what is made of a file; it is made once, and then read from the local copy.
+
+    Args:
+        contents: Of the file.
+        options: How it is to be made, as something whose text says all.
+        folder: Where the files are that its shapes name; None for those that `make` gives.
+        make: Makes it, with files that belong to it.
+
+    Raises:
+        AssetError: If what the local copy has of it is damaged.
+        UnwritableFileError: If it cannot be written.
+    """
+    text = f"{_VERSION} {sha256(contents).hexdigest()} {options!r}"
+    place = default_root() / _FOLDER / sha256(text.encode()).hexdigest()[:20]
+    kept = place / _THING
+    if not kept.is_file():
+        made, files = make()
+        write_folder(place, {**files, _THING: json.dumps(_plain(made)).encode()})
+    try:
+        return _thing_of(json.loads(read_text(kept, _LARGEST)), folder or place)
+    except (ValueError, KeyError, TypeError) as error:
+        raise AssetError(f"{kept} is damaged ({error}); delete the folder that it is in") from error
+
+
+def _plain(made: Made) -> dict[str, Any]:
+    return {
+        "parts": [_plain_shape(part) for part in made.parts],
+        "joints": [
+            {**vars(joint), "parts": [_plain_shape(part) for part in joint.parts]}
+            for joint in made.joints
+        ],
+        "rests": dict(made.rests),
+        "points": {name: asdict(point) for name, point in made.points.items()},
+        "grasps": [list(vars(grasp).values()) for grasp in made.grasps],
+    }
+
+
+def _plain_shape(shape: Shape) -> dict[str, Any]:
+    usual = {field.name: field.default for field in fields(shape)}
+    given = {name: value for name, value in vars(shape).items() if value != usual[name]}
+    for name in ("friction", "finish"):
+        if name in given:
+            given[name] = asdict(given[name])
+    return {"kind": type(shape).__name__, **given}
+
+
+def _thing_of(plain: dict[str, Any], folder: Path) -> Made:
+    return Made(
+        parts=[_shape(part, folder) for part in plain["parts"]],
+        joints=[_joint(joint, folder) for joint in plain["joints"]],
+        rests={name: tuple(turn) for name, turn in plain["rests"].items()},
+        points={name: NamedPoint(**point) for name, point in plain["points"].items()},
+        grasps=[Grasp(*grasp) for grasp in plain["grasps"]],
+    )
+
+
+def _joint(plain: dict[str, Any], folder: Path) -> Joint:
+    given: dict[str, Any] = {**plain, "parts": tuple(_shape(p, folder) for p in plain["parts"])}
+    return Joint(**given)
+
+
+def _shape(plain: dict[str, Any], folder: Path) -> Shape:
+    given = dict(plain)
+    kind = _KINDS[given.pop("kind")]
+    for name, made_of in (("friction", Friction), ("finish", Finish)):
+        if name in given:
+            given[name] = made_of(**given[name])
+    shape = kind(**given)
+    return replace(shape, file=folder / shape.file) if isinstance(shape, Mesh) else shape

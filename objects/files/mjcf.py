@@ -14,8 +14,7 @@ from objects.descriptor import Grasp, NamedPoint, ObjectDescriptor
 from objects.family import Made
 from objects.files.convex import few_corners, rounded
 from objects.files.grasps import MOST, proposed
-from objects.files.mesh import UNKNOWN, UPRIGHT, identifier, resting
-from objects.files.remembering import Files, remembered
+from objects.files.mesh import UNKNOWN, UPRIGHT, Files, identifier, remembered, resting
 from objects.joints import Joint
 from objects.shapes import (
     MOST_CORNERS,

@@ -22,8 +22,7 @@ from robot_layouts.motion.collision.cell import Cell, cell_of
 from robot_layouts.motion.collision.checker import Checker
 from robot_layouts.motion.collision.travel import Intervals, TravelBounds
 from robot_layouts.motion.model.bodies import Bodies
-from robot_layouts.motion.model.hermite import hermite, hermite_extremes, hermite_slopes
-from robot_layouts.motion.timed_motion import TimedMotion
+from robot_layouts.motion.timed_motion import TimedMotion, hermite, hermite_extremes, hermite_slopes
 from robot_layouts.motion.timing import velocities
 
 CHUNK = 1024  # pieces that are checked together
