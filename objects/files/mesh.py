@@ -22,7 +22,7 @@ from objects.files.convex import MOST_PARTS, convex_parts, hull_of, hull_volume
 from objects.files.grasps import POINTS, proposed
 from objects.joints import Joint
 from objects.shapes import GREY, SIZED, Color, ConvexHull, Finish, Friction, Mesh, Place, Shape
-from objects.solids import mass_of
+from objects.solids import mass_of, rounded_turn
 from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole
 from robot_layouts.core.errors import AssetError, DescriptorError, UnreadableFileError
 from robot_layouts.core.files import read_regular, read_text
@@ -160,7 +160,6 @@ _ALIKE = np.cos(np.radians(15))  # between the undersides of two rests
 _AS_MADE = np.cos(np.radians(10))  # between what is upright and the file's own z axis
 _MOST = 4
 _LEVEL = 1e-9
-_DIGITS = 9
 
 
 class _Side(NamedTuple):
@@ -225,9 +224,7 @@ def _turned(down: Floats) -> Quaternion:
     x, y, z = down.tolist()
     aside = float(np.hypot(x, y))
     axis = (-y / aside, x / aside, 0.0) if aside > _LEVEL else (1.0, 0.0, 0.0)
-    turn = quaternion_about(axis, np.arctan2(aside, -z)).tolist()
-    w, i, j, k = (round(number, _DIGITS) + 0.0 for number in turn)
-    return w, i, j, k
+    return rounded_turn(quaternion_about(axis, np.arctan2(aside, -z)))
 
 
 def remembered(
