@@ -36,7 +36,6 @@ from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import UrdfReferences, read_references
 
 LARGEST_FILE = 2**28  # bytes
-SCENERY_FOLDER = "mani_skill/utils"  # inside the wheel
 ALL_ROBOTS = "robots"  # maniskill_robots: for a URDF that uses files of several robots' folders
 LICENCE_FILES = ("LICENSE", "LICENSE.txt")
 README = "README.md"
@@ -140,8 +139,8 @@ def build_scenery(installed: Path) -> AssetPackage:
     Raises:
         AssetError: If mani_skill lacks one of its files.
     """
-    folder = installed / SCENERY_FOLDER
-    origin = _origin(MANI_SKILL, SCENERY, SCENERY_FOLDER, "scene", _licence(folder))
+    folder = installed / (inside := "mani_skill/utils")
+    origin = _origin(MANI_SKILL, SCENERY, inside, "scene", _licence(folder))
     paths = sorted(locator.file for locator in (TABLE, GROUND_TEXTURE))
     return AssetPackage(origin, tuple(_asset_file(origin, folder, p, set(), set()) for p in paths))
 
