@@ -17,22 +17,19 @@ from robot_layouts.core.errors import AssetError
 from robot_layouts.core.files import read_regular, read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
 from robot_layouts.core.writing import write_whole
-from robots.assets import scenery
-from robots.assets.locator import UrdfLocator
+from robots.assets.locator import GROUND_TEXTURE, SCENERY, TABLE, UrdfLocator
 from robots.assets.manifest import (
-    AssetFile,
-    AssetManifest,
-    AssetPackage,
-    PackageOrigin,
-    load_manifest,
-)
-from robots.assets.packages import (
     INDEX_PACKAGES,
     MANI_SKILL,
     OBJECT_PACKAGES,
+    AssetFile,
+    AssetManifest,
+    AssetPackage,
     IndexPackage,
+    PackageOrigin,
     SourceError,
     find_package,
+    load_manifest,
 )
 from robots.mjcf.reading import files_of
 from robots.registry import CATALOGUE, RobotRegistry
@@ -94,7 +91,7 @@ def build_manifest() -> AssetManifest:
     packages = {name: _build_or_keep(name, urdfs[name]) for name in urdfs}
     scenes = build_scenery(find_package(MANI_SKILL.name))
     things = {f"{package.prefix}objects": build_objects(package) for package in OBJECT_PACKAGES}
-    return AssetManifest({**packages, scenery.PACKAGE: scenes, **things})
+    return AssetManifest({**packages, SCENERY: scenes, **things})
 
 
 def to_json(manifest: AssetManifest) -> str:
@@ -142,9 +139,9 @@ def build_scenery(installed: Path) -> AssetPackage:
     Raises:
         AssetError: If mani_skill lacks one of its files.
     """
-    folder = installed / scenery.FOLDER
-    origin = _origin(MANI_SKILL, scenery.PACKAGE, scenery.FOLDER, "scene", _licence(folder))
-    paths = sorted(locator.file for locator in scenery.FILES)
+    folder = installed / (inside := "mani_skill/utils")
+    origin = _origin(MANI_SKILL, SCENERY, inside, "scene", _licence(folder))
+    paths = sorted(locator.file for locator in (TABLE, GROUND_TEXTURE))
     return AssetPackage(origin, tuple(_asset_file(origin, folder, p, set(), set()) for p in paths))
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from layouts.arrangement import Arrangement
-from layouts.description import describe
 from robot_layouts.core.figures import save_figure
 from robot_layouts.core.writing import write_whole
 from robots import LayoutError
@@ -27,6 +26,8 @@ class Layout(Arrangement):
 
     def __str__(self) -> str:
         """Show a table: name, robot, action numbers, base pose, keyframe and reach of each."""
+        from layouts.preview import describe
+
         return describe(self)
 
     def _repr_html_(self) -> str:
@@ -147,7 +148,7 @@ class Layout(Arrangement):
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If scipy is not installed.
         """
-        from layouts.export.drake import write_drake
+        from layouts.export.urdf import write_drake
 
         return write_drake(self, path, visuals=visuals)
 

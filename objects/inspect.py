@@ -1,8 +1,10 @@
-"""``robot-layouts objects list``, and what there is to know about a thing, as text."""
+"""``robot-layouts objects list`` and ``fetch``, and what there is to know about a thing."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import PurePath
+from typing import Annotated
 
 from objects.descriptor import ObjectDescriptor
 from objects.packaged import PACKAGED
@@ -10,7 +12,33 @@ from objects.registry import ObjectRegistry
 from objects.shapes import Mesh
 from robot_layouts.core.cli import Word
 from robot_layouts.core.commands import print_error, printable
+from robot_layouts.core.errors import UnknownNameError
+from robot_layouts.core.paths import default_root
 from robot_layouts.core.quoting import columns
+from robots.assets.fetching import default_sources, ensure
+from robots.assets.manifest import AssetFile, load_manifest
+from robots.assets.store import AssetStore
+from robots.fetch_assets import print_files, union
+from robots.urdf.mesh_files import ENDINGS
+
+
+def named_object(word: str, seed: int | None = None) -> ObjectDescriptor:
+    """Return the thing that a word names.
+
+    Args:
+        word: A name of the registry, or the path of a mesh or an MJCF.
+        seed: Draws a member of the family of that name.
+
+    Raises:
+        RobotLayoutsError: If there is no such thing, or its file can be none.
+    """
+    ending = PurePath(word).suffix.lower()
+    if ending in ENDINGS:
+        return ObjectDescriptor.from_mesh(word)
+    if ending in (".xml", ".mjcf"):
+        return ObjectDescriptor.from_mjcf(word)
+    return ObjectRegistry.load(word, seed)
+
 
 OBJECT = Word("OBJECT", about="a name that `robot-layouts objects list` prints, a mesh, or an MJCF")
 
@@ -93,3 +121,42 @@ def _parts(thing: ObjectDescriptor) -> Iterator[str]:
 
 def _row(values: Iterable[float]) -> str:
     return "(" + ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in values) + ")"
+
+
+NAME = Word("OBJECT", about="a name of the second list that `robot-layouts objects list` prints")
+
+
+def fetch(
+    objects: Sequence[Annotated[str, NAME]] = (), *, check: bool = False, offline: bool = False
+) -> int:
+    """Bring the files of objects to this machine, or check them, and print their licences.
+
+    Exit code: 0 if every file is there and right, 1 if not, 2 for bad usage.
+
+    Args:
+        objects: Objects to fetch (default: all).
+        check: Fetch nothing, only list what is missing or wrong.
+        offline: Never use the network.
+
+    Raises:
+        RobotLayoutsError: If there is no such object, or no source has a file.
+    """
+    needs = {name: object_files(name) for name in objects or PACKAGED}
+    store = AssetStore(default_root())
+    if not check:
+        ensure(union(needs), store, default_sources(offline=offline))
+    return print_files(needs, store)
+
+
+def object_files(name: str) -> tuple[AssetFile, ...]:
+    """Return the files that an object of a package needs, all its members included.
+
+    Raises:
+        UnknownNameError: If no package brings it.
+    """
+    if name not in PACKAGED:
+        raise UnknownNameError("object of a package", name, PACKAGED)
+    one = PACKAGED[name]
+    package = load_manifest().package(one.package)
+    mains = {one.file.format(number) for number in range(one.members)}
+    return tuple(file for file in package.files if mains & {*file.physics})

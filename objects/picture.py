@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from objects.descriptor import ObjectDescriptor
-from objects.inspect import OBJECT
-from objects.named import named_object
+from objects.inspect import OBJECT, named_object
 from objects.registry import ObjectRegistry
 from objects.solids import surface
 from robot_layouts.core.cli import File, Seed

@@ -22,9 +22,11 @@ from robot_layouts.kinematics.rotations import (
     rotate,
     transform,
 )
+from robots.descriptor import Quaternion
 
 SIDES = 32  # of the polygon that stands for a circle where a surface is wanted
 _WHOLE = 1e9  # nanometres are whole numbers
+_DIGITS = 9  # of numbers that shapes are written with
 _SAME_PLANE = 1e-7  # m; corners this near to a plane are in it
 _BOX = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
@@ -59,6 +61,18 @@ class MassProperties(NamedTuple):
     volume: float
     mass: float
     centre: Floats
+
+
+def rounded_place(numbers: Sequence[float] | Floats) -> Place:
+    """Return a place as shapes are written with it (m)."""
+    x, y, z = (round(float(number), _DIGITS) + 0.0 for number in numbers)
+    return x, y, z
+
+
+def rounded_turn(quaternion: Floats) -> Quaternion:
+    """Return a quaternion likewise, wxyz."""
+    w, x, y, z = (round(number, _DIGITS) + 0.0 for number in quaternion.tolist())
+    return w, x, y, z
 
 
 def mass_of(shapes: Iterable[Shape]) -> MassProperties:

@@ -54,10 +54,10 @@ _FOR_USERS = {
     "robots guess": "robots.from_urdf:print_guess",
     "objects list": "objects.inspect:list_objects",
     "objects inspect": "robot_layouts.simulation.checks.commands:inspect_objects",
-    "objects fetch": "objects.fetch:fetch",
+    "objects fetch": "objects.inspect:fetch",
     "objects show": "objects.picture:show",
     "new task": "tasks.new_task:new_task",
-    "new robot": "robots.new_robot:new_robot",
+    "new robot": "robots.from_urdf:new_robot",
 }
 _FOR_DEVELOPERS = {
     "portable": "robots.portable:portable",

@@ -18,9 +18,9 @@ from robots.commands import COMMANDS, FRAMES, JointCommand
 JOINTS_OF_A_POSE = 6  # that an arm needs to choose place and orientation
 
 
-def names(prefix: str, first: int, last: int) -> tuple[str, ...]:
-    """Return ``prefix + str(i)`` for i from ``first`` to ``last``, both included."""
-    return tuple(f"{prefix}{i}" for i in range(first, last + 1))
+def names(prefix: str, first: int, last: int, suffix: str = "") -> tuple[str, ...]:
+    """Return ``prefix + str(i) + suffix`` for i from ``first`` to ``last``, both included."""
+    return tuple(f"{prefix}{i}{suffix}" for i in range(first, last + 1))
 
 
 def is_gripper(group: str) -> bool:

@@ -289,7 +289,7 @@ class RobotDescriptor:
 
     def _repr_html_(self) -> str:
         """Show a notebook the table of action numbers."""
-        from robots.display import heading, table
+        from robot_layouts.core.pages import heading, table
 
         heads = ("#", "action number", "lowest", "highest", "unit", "joints")
         rows = [

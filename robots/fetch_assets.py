@@ -9,14 +9,11 @@ from robot_layouts.core.cli import Word, main_of
 from robot_layouts.core.commands import UsageError, print_error, printable, start
 from robot_layouts.core.errors import RobotLayoutsError
 from robot_layouts.core.paths import absolute, default_root
-from robots.assets import scenery
 from robots.assets.fetching import default_sources, ensure
-from robots.assets.locator import UrdfLocator
-from robots.assets.manifest import AssetFile, load_manifest
-from robots.assets.packages import INDEX_PACKAGES
-from robots.assets.progress import size
+from robots.assets.locator import SCENERY, UrdfLocator
+from robots.assets.manifest import INDEX_PACKAGES, AssetFile, load_manifest
 from robots.assets.sources import AssetSource, HubSource, InstalledPackage, LocalCopy, PackageWheel
-from robots.assets.store import AssetStore, FileState
+from robots.assets.store import AssetStore, FileState, size
 from robots.descriptor import RobotDescriptor
 from robots.named import FORMS, named_robot
 from robots.registry import RobotRegistry
@@ -63,7 +60,7 @@ def fetch(
         chosen, failures = RobotRegistry.load_all()
     needs = {robot.name: robot_files(robot, pictures=pictures) for robot in chosen}
     if pictures and not robots:
-        needs["scenery"] = load_manifest().package(scenery.PACKAGE).files
+        needs["scenery"] = load_manifest().package(SCENERY).files
     store = AssetStore(default_root() if dest is None else absolute(dest, "--dest"))
     sources = _sources(source, store, offline=offline, revision=revision)
     if source and not robots:

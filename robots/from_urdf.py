@@ -1,4 +1,4 @@
-"""``robot-layouts robots guess``: a descriptor from a URDF or MJCF, and the reasons."""
+"""``robot-layouts robots guess`` and ``new robot``: a descriptor of a URDF or MJCF, or a module."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
-from robot_layouts.core.cli import Folder, Word, main_of
-from robot_layouts.core.commands import start
+from robot_layouts.core.cli import Folder, Word
+from robot_layouts.core.commands import notice
 from robot_layouts.core.errors import (
     AssetError,
     DescriptorError,
@@ -20,15 +21,18 @@ from robot_layouts.core.errors import (
     UnknownNameError,
 )
 from robot_layouts.core.paths import absolute
+from robot_layouts.core.writing import check_module_name, write_new
 from robots.assets.locator import LocalUrdf
+from robots.data_module import write_module
 from robots.guess import Guess, guess
 from robots.guessing.hints import NOTHING, Hints, hints_of
 from robots.mjcf.locator import LocalMjcf, is_mjcf
+from robots.registry import RobotRegistry
 from robots.urdf.cleaning.xacro_files import template_of, with_arguments
 from robots.urdf.reading import model_of
 from robots.urdf.srdf import read_semantics
 
-__all__ = ["Guess", "guess_descriptor", "main"]
+__all__ = ["Guess", "guess_descriptor"]
 
 URDF, MJCF = "urdf", "mjcf"  # as robot_descriptions has them, too
 
@@ -165,7 +169,80 @@ def _described(name: str, form: str | None) -> Path:
     return Path(path)
 
 
-main = main_of(print_guess, "robots guess")
+_REGISTERED = """
+RobotRegistry.register({constant})  # from here on, it goes by its name: {name!r}
+"""
 
-if __name__ == "__main__":
-    start(main)
+_TEST = '''"""Tests whether {name} stands and moves as it should; run it with pytest, here."""
+
+from layouts import single
+from robots import RobotRegistry
+from robot_layouts.simulation.checks.grasp import try_grasps
+from robot_layouts.simulation.checks.tcp_control import try_tcp_control
+from robot_layouts.simulation.checks.trial import try_robot
+from {module} import {constant}
+
+
+def test_it_goes_by_its_name():
+    assert RobotRegistry.load({name!r}) == {constant}
+
+
+def test_nothing_collides_where_it_stands():
+    report = single({{"arm": {constant}}}).validate(workspaces=False)
+    assert report.ok, str(report)
+
+
+def test_every_action_number_moves_its_own_joints():
+    assert not try_robot({constant}).problems
+
+
+def test_its_tcp_goes_where_it_is_sent():
+    if {constant}.arm_joints:
+        assert [seen.problem for seen in try_tcp_control({constant}) if seen.problem] == []
+
+
+def test_its_fingers_meet_at_the_tcp_and_hold_a_cube():
+    assert [seen.problem for seen in try_grasps({constant}) if seen.problem] == []
+'''
+
+
+def new_robot(
+    urdf: str, *, name: str | None = None, out: Folder = Path(), folder: Folder | None = None
+) -> None:
+    """Write the file of a new robot from its URDF, and a test.
+
+    Args:
+        urdf: URDF or MJCF, or name in robot_descriptions.
+        name: Name of the robot (the name in its URDF).
+        out: Folder of the files.
+        folder: Folder whose files may be read, too, such as that of a package elsewhere.
+
+    Raises:
+        RobotLayoutsError: If the URDF is unusable, or a file is there already.
+    """
+    found = guess_descriptor(urdf, name, folder=folder)
+    name = found.descriptor.name
+    module, constant = name.lower(), name.upper()
+    better = f"--name my_{module}"
+    if name in RobotRegistry.names():
+        words = f"there is a robot {name} already; choose another name, such as {better}"
+        raise DescriptorError(words)
+    check_module_name(module, better, DescriptorError)
+    robot = replace(found.descriptor, urdf=_seen_from(out, found.descriptor.urdf))
+    source = write_module(robot, found.reasons, also=["RobotRegistry"])
+    declared = source + _REGISTERED.format(constant=constant, name=name)
+    test = _TEST.format(module=module, constant=constant, name=name)
+    for path in write_new(out, {f"{module}.py": declared, f"test_{module}.py": test}):
+        print(path)
+    notice(
+        f"The comments in {module}.py say what was guessed: correct it, and delete them. Test it:"
+        f" python -m pytest {out / f'test_{module}.py'}\n"
+        f"In {out.absolute()} it goes wherever a robot goes, as {module}:{constant}"
+    )
+
+
+def _seen_from(folder: Path, source: Any) -> LocalUrdf | LocalMjcf:
+    """Return where a user's file is, with its paths relative to a folder."""
+    given = {"path": source.path, "folder": source.folder}
+    start = folder.absolute()
+    return replace(source, **{k: Path(os.path.relpath(p, start)) for k, p in given.items() if p})

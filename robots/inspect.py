@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
 
-from robot_layouts.core.cli import Word, main_of
-from robot_layouts.core.commands import print_error, start
+from robot_layouts.core.commands import print_error
 from robot_layouts.core.paths import default_root
 from robot_layouts.core.quoting import columns
 from robots.assets.locator import LocalUrdf, UrdfLocator
-from robots.assets.manifest import AssetFile, AssetPackage, load_manifest
-from robots.assets.packages import SourceError, find_package
-from robots.assets.progress import size
-from robots.assets.store import AssetStore, FileState
+from robots.assets.manifest import AssetFile, AssetPackage, SourceError, find_package, load_manifest
+from robots.assets.store import AssetStore, FileState, size
 from robots.descriptor import JointGroup, RobotDescriptor
 from robots.fetch_assets import describe_file
 from robots.mjcf.locator import LocalMjcf
-from robots.named import FORMS, named_robot
+from robots.named import named_robot
 from robots.registry import RobotRegistry
 from robots.urdf.model import ModelJoint
 from robots.urdf.reading import model_of
@@ -29,13 +25,13 @@ from robots.urdf.tcp import find_tcp
 from robots.urdf.tree import kinematic_tree
 
 
-def inspect(robots: Sequence[Annotated[str, Word("ROBOT", about=FORMS)]]) -> None:
+def inspect(robots: Sequence[str]) -> None:
     """Print everything about robots: joints, action numbers, gripper, cameras and files.
 
     Fetches nothing.
 
     Args:
-        robots: The robots.
+        robots: The robots, as `named_robot` takes them.
 
     Raises:
         RobotLayoutsError: If a robot does not exist, or its files cannot be read.
@@ -279,9 +275,3 @@ def _summary(files: Sequence[AssetFile], store: AssetStore) -> str:
 
 def _row(values: Iterable[float]) -> str:
     return "(" + ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in values) + ")"
-
-
-main = main_of(inspect, "robots inspect")
-
-if __name__ == "__main__":
-    start(main)

@@ -23,6 +23,7 @@ OWN_Y: Vector3 = (0.0, 1.0, 0.0)
 _Owners = dict[str, str | None]
 
 BODY = "body"  # what takes action numbers and is no limb: a torso that turns, a base that drives
+_OTHER_SIDE = {"left": "right", "right": "left", "l": "r", "r": "l"}
 LARGEST_IMAGE = 16384  # pixels; what graphics drivers allow
 
 
@@ -249,38 +250,39 @@ class Limb:
         yield from repeated("Limb: tcp_position_links", self.tcp_position_links)
 
 
-def both_sides(
-    tcp_link: str,
-    reach: float,
-    base: Vector3,
-    fingers: Fingers | None = None,
-    tcp_position_links: tuple[str, ...] = (),
-) -> dict[str, Limb]:
-    """Return the limbs ``left`` and ``right`` of a robot whose sides mirror each other.
+def mirrored(names: Any) -> Any:
+    """Return the same names on the other side: of what is left on the right, and the other way.
 
-    In names of links, ``{side}`` stands for ``left`` or ``right`` and ``{s}`` for ``l`` or ``r``.
+    The first part of a name that says a side counts, ``left``, ``right``, ``l`` or ``r`` between
+    underscores; a name without one stays as it is.
 
     Args:
-        tcp_link: See `Limb`.
-        reach: See `Limb` (m).
-        base: Of the left limb (m); the right one's has the other sign of y.
-        fingers: See `Limb`.
-        tcp_position_links: See `Limb`.
+        names: A name, or a tuple of names or of tuples of them.
     """
+    if not isinstance(names, str):
+        return tuple(map(mirrored, names))
+    words = names.split("_")
+    side = next((word for word in words if word in _OTHER_SIDE), None)
+    if side is not None:
+        words[words.index(side)] = _OTHER_SIDE[side]
+    return "_".join(words)
 
-    def named(link: str, side: str) -> str:
-        return link.format(side=side, s=side[0])
 
-    def limb(side: str, sign: int) -> Limb:
-        return Limb(
-            tcp_link=named(tcp_link, side),
-            reach=reach,
-            base=(base[0], sign * base[1], base[2]),
-            fingers=fingers and replace(fingers, links=[named(f, side) for f in fingers.links]),
-            tcp_position_links=tuple(named(link, side) for link in tcp_position_links),
-        )
+def both_sides(left: Limb) -> dict[str, Limb]:
+    """Return the limbs ``left`` and ``right`` of a robot whose sides mirror each other.
 
-    return {"left": limb("left", 1), "right": limb("right", -1)}
+    Args:
+        left: The left one.
+    """
+    x, y, z = left.base
+    right = replace(
+        left,
+        tcp_link=mirrored(left.tcp_link),
+        base=(x, -y, z),
+        fingers=left.fingers and replace(left.fingers, links=mirrored(left.fingers.links)),
+        tcp_position_links=mirrored(left.tcp_position_links),
+    )
+    return {"left": left, "right": right}
 
 
 def among(*groups: tuple[str, ...]) -> tuple[tuple[str, str], ...]:

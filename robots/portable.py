@@ -13,8 +13,7 @@ import sys
 from collections.abc import Sequence
 from typing import Annotated, NoReturn
 
-from robot_layouts.core.cli import Word, main_of
-from robot_layouts.core.commands import start
+from robot_layouts.core.cli import Word
 from robot_layouts.core.errors import RobotLayoutsError, SimulationError
 from robot_layouts.core.portable import portable_variables
 
@@ -67,9 +66,3 @@ def numpy_versions() -> tuple[str, ...]:
     except ImportError:
         raise RobotLayoutsError("this NumPy does not tell what processors it knows") from None
     return tuple(__cpu_dispatch__)
-
-
-main = main_of(portable, "portable")
-
-if __name__ == "__main__":
-    start(main)

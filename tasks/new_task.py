@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from layouts import Layout, face_to_face, ring, single
-from robot_layouts.core.cli import Folder, by_name, main_of
-from robot_layouts.core.commands import notice, start
+from robot_layouts.core.cli import Folder, by_name
+from robot_layouts.core.commands import notice
 from robot_layouts.core.paths import absolute
 from robot_layouts.core.writing import check_module_name, write_new
 from robot_layouts.kinematics.rotations import rotate
@@ -198,9 +198,3 @@ def _names(name: str) -> tuple[str, str]:
         )
     check_module_name(module, f"My{title}", TaskError)
     return module, task_id
-
-
-main = main_of(new_task, "new task")
-
-if __name__ == "__main__":
-    start(main)

@@ -9,7 +9,7 @@ import pytest
 
 from robots import AssetError, RobotRegistry
 from robots.assets.locator import UrdfLocator
-from robots.assets.packages import EXAMPLE_ROBOT_DATA
+from robots.assets.manifest import EXAMPLE_ROBOT_DATA
 from robots.registry import CATALOGUE
 
 # One of each kind: the others differ from these in data alone.

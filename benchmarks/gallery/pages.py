@@ -34,7 +34,7 @@ from benchmarks.records import (
 )
 from benchmarks.robots.judge import EXPECTED, Expected, expected_of, read_expectations
 from layouts import Layout
-from layouts.description import action_text, decimal, facing_text
+from layouts.preview import action_text, decimal, facing_text
 from parity.results import number_text as difference_text
 from parity.results import read_results
 from robot_layouts.core.writing import write_whole
@@ -47,7 +47,7 @@ from robots import (
     RobotRegistry,
     UnknownNameError,
 )
-from robots.assets.progress import size
+from robots.assets.store import size
 from robots.registry import CATALOGUE as ROBOTS
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf

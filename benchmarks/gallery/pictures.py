@@ -28,8 +28,7 @@ from robot_layouts.simulation.rendering import vulkan_problem
 from robot_layouts.simulation.simulation import Simulation
 from robots import DescriptorError, MissingPackageError, RobotDescriptor, RobotRegistry
 from robots.assets.locator import LocalUrdf, UrdfLocator
-from robots.assets.manifest import AssetPackage, load_manifest
-from robots.assets.packages import EXAMPLE_ROBOT_DATA
+from robots.assets.manifest import EXAMPLE_ROBOT_DATA, AssetPackage, load_manifest
 from robots.registry import CATALOGUE as ROBOTS
 from robots.urdf.summary import parse_urdf, read_urdf
 from tasks import TaskEnv

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from layouts.frames import Pose
 from layouts.placement import Placement
 from robot_layouts.kinematics.rotations import Floats, pose_matrix, transform
-from robots.bodies.depth import overlap
 from robots.bodies.hulls import Hull, RobotModel, convex_hull
+from robots.bodies.overlaps import overlap
 
 Pairs = NDArray[np.intp]  # (n, 2): indices of hulls
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from layouts.arrangement import Arrangement
-from layouts.description import decimal, headline
-from layouts.preview import LONGEST_NAME, draw_tables, style_plan, write_beside
+from layouts.preview import LONGEST_NAME, decimal, draw_tables, headline, style_plan, write_beside
 from layouts.validation.findings import (
     Clearance,
     Finding,

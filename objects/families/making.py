@@ -15,6 +15,7 @@ import numpy as np
 
 from objects.descriptor import Grasp, NamedPoint
 from objects.shapes import Box, Color, ConvexHull, Cylinder, Finish, Friction, Place, Shape, linear
+from objects.solids import rounded_place, rounded_turn
 from robot_layouts.kinematics.rotations import Floats, cross, quaternion_of, rotation_about
 from robots.descriptor import IDENTITY, Quaternion
 
@@ -73,8 +74,8 @@ DARK_WOOD = matter(700, 0.45, "#7C5230")
 def block(size: Axis, middle: Axis, made_of: Matter, turned: Quaternion = IDENTITY) -> Box:
     """Return a box of some lengths along x, y, z about a middle."""
     return Box(
-        _place([length / 2 for length in size]),
-        position=_place(middle),
+        rounded_place([length / 2 for length in size]),
+        position=rounded_place(middle),
         quaternion=turned,
         **made_of,
     )
@@ -82,7 +83,7 @@ def block(size: Axis, middle: Axis, made_of: Matter, turned: Quaternion = IDENTI
 
 def disc(radius: float, bottom: float, top: float, made_of: Matter) -> Cylinder:
     """Return an upright cylinder about the z axis."""
-    middle = _place((0.0, 0.0, (bottom + top) / 2))
+    middle = rounded_place((0.0, 0.0, (bottom + top) / 2))
     return Cylinder(
         round(radius, _DIGITS),
         round((top - bottom) / 2, _DIGITS),
@@ -100,7 +101,7 @@ def rod(start: Axis | Floats, end: Axis | Floats, radius: float, made_of: Matter
     return Cylinder(
         round(radius, _DIGITS),
         round(length / 2, _DIGITS),
-        position=_place(middle),
+        position=rounded_place(middle),
         quaternion=_turn(along / length),
         **made_of,
     )
@@ -110,14 +111,14 @@ def prism(
     outline: Sequence[tuple[float, float]], bottom: float, top: float, made_of: Matter
 ) -> ConvexHull:
     """Return what stands on a convex outline in x and y."""
-    corners = [_place((x, y, z)) for z in (bottom, top) for x, y in outline]
+    corners = [rounded_place((x, y, z)) for z in (bottom, top) for x, y in outline]
     return ConvexHull(tuple(corners), **made_of)
 
 
 def taper(low: float, bottom: float, high: float, top: float, made_of: Matter) -> ConvexHull:
     """Return what narrows from one radius at the bottom to another at the top."""
     ends = ((low, bottom), (high, top))
-    corners = [_place((x, y, z)) for radius, z in ends for x, y in polygon(radius, SECTIONS)]
+    corners = [rounded_place((x, y, z)) for radius, z in ends for x, y in polygon(radius, SECTIONS)]
     return ConvexHull(tuple(corners), **made_of)
 
 
@@ -125,7 +126,7 @@ def hexagon(start: Axis, length: float, radius: float, made_of: Matter) -> Conve
     """Return a hexagonal bar along x from the middle of its end; two of its sides are level."""
     x, y, z = start
     corners = [
-        _place((at, y + aside, z + up))
+        rounded_place((at, y + aside, z + up))
         for at in (x, x + length)
         for aside, up in polygon(radius, 6)
     ]
@@ -157,7 +158,7 @@ def tube(
     for i in range(sections):
         j = (i + 1) % sections
         corners = [
-            _place((*ring[at], z))
+            rounded_place((*ring[at], z))
             for rings, z in zip(zip(holes, ends, strict=True), (bottom[2], top[2]), strict=True)
             for ring in rings
             for at in (i, j)
@@ -199,8 +200,8 @@ def bar(start: Axis | Floats, end: Axis | Floats, thick: float, made_of: Matter)
     along = np.subtract(end, start)
     length = float(np.linalg.norm(along))
     half = (length / 2, thick / 2, thick / 2)
-    turned, middle = _turn(along / length), _place(np.add(start, end) / 2)
-    return Box(_place(half), position=middle, quaternion=turned, **made_of)
+    turned, middle = _turn(along / length), rounded_place(np.add(start, end) / 2)
+    return Box(rounded_place(half), position=middle, quaternion=turned, **made_of)
 
 
 def loop(
@@ -254,9 +255,9 @@ def grips(
         approach, closing = -(turned @ np.array(out)), turned @ normal
         approach = rotation_about(_axis(closing), pitch) @ approach
         for way in (closing, -closing):
-            places.append(_place(np.add(middle, np.multiply(along, offset))))
+            places.append(rounded_place(np.add(middle, np.multiply(along, offset))))
             frames.append(np.stack([cross(way, approach), way, approach], axis=1))
-    turns = map(_rounded, quaternion_of(np.reshape(frames, (-1, 3, 3))))
+    turns = map(rounded_turn, quaternion_of(np.reshape(frames, (-1, 3, 3))))
     pairs = zip(places, turns, strict=True)
     return [Grasp(place, turn, round(width, _DIGITS), part) for place, turn in pairs]
 
@@ -391,7 +392,7 @@ def point(x: float, y: float, z: float, away: Axis = (0.0, 0.0, 1.0)) -> NamedPo
     side = np.cross((0.0, 1.0, 0.0) if abs(ahead[1]) < 0.9 else (1.0, 0.0, 0.0), ahead)
     side /= np.linalg.norm(side)
     frame = np.stack([side, np.cross(ahead, side), ahead], axis=1)
-    return NamedPoint(_place((x, y, z)), _quaternion(frame))
+    return NamedPoint(rounded_place((x, y, z)), _quaternion(frame))
 
 
 def _turn(ahead: Floats) -> Quaternion:
@@ -402,17 +403,7 @@ def _turn(ahead: Floats) -> Quaternion:
 
 
 def _quaternion(frame: Floats) -> Quaternion:
-    return _rounded(quaternion_of(frame))
-
-
-def _rounded(quaternion: Floats) -> Quaternion:
-    w, x, y, z = (round(number, _DIGITS) + 0.0 for number in quaternion.tolist())
-    return w, x, y, z
-
-
-def _place(numbers: Sequence[float] | Floats) -> Place:
-    x, y, z = (round(float(number), _DIGITS) + 0.0 for number in numbers)
-    return x, y, z
+    return rounded_turn(quaternion_of(frame))
 
 
 def _axis(vector: Floats) -> Axis:

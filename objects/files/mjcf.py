@@ -14,9 +14,7 @@ from objects.descriptor import Grasp, NamedPoint, ObjectDescriptor
 from objects.family import Made
 from objects.files.convex import few_corners, rounded
 from objects.files.grasps import MOST, proposed
-from objects.files.mesh import UNKNOWN, identifier
-from objects.files.remembering import Files, remembered
-from objects.files.rests import UPRIGHT, resting
+from objects.files.mesh import UNKNOWN, UPRIGHT, Files, identifier, remembered, resting
 from objects.joints import Joint
 from objects.shapes import (
     MOST_CORNERS,
@@ -27,11 +25,10 @@ from objects.shapes import (
     Cylinder,
     Friction,
     Mesh,
-    Place,
     Shape,
     Sphere,
 )
-from objects.solids import mass_of, surface
+from objects.solids import mass_of, rounded_place, rounded_turn, surface
 from robot_layouts.core.bounds import checked_number
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robot_layouts.kinematics.rotations import Floats, multiply, pose_matrix, quaternion_of
@@ -203,8 +200,8 @@ class _Reading:
             "collides": collides,
             "visible": visible,
         }
-        place, turn = _place(pose[:3, 3]), _turn(pose[:3, :3])
-        upright = _rounded_turn(multiply(turn, _ALONG_X))
+        place, turn = rounded_place(pose[:3, 3]), _turn(pose[:3, :3])
+        upright = rounded_turn(multiply(turn, _ALONG_X))
         if not (collides or visible):
             return []
         if kind == kinds.mjGEOM_MESH:
@@ -233,7 +230,7 @@ class _Reading:
             self._files[file] = binary_stl(corners[model.mesh_face[start : start + faces]])
             looks: dict[str, Any] = {**common, "collides": False}
             at: dict[str, Any] = {
-                "position": _place(pose[:3, 3]),
+                "position": rounded_place(pose[:3, 3]),
                 "quaternion": _turn(pose[:3, :3]),
             }
             found.append(Mesh(file, **at, **looks))
@@ -277,8 +274,8 @@ class _Reading:
             name=name,
             kind=kind,
             parts=tuple(shapes),
-            axis=_place(pose[:3, :3] @ model.jnt_axis[joint]),
-            at=_place(pose[:3, :3] @ model.jnt_pos[joint] + pose[:3, 3]),
+            axis=rounded_place(pose[:3, :3] @ model.jnt_axis[joint]),
+            at=rounded_place(pose[:3, :3] @ model.jnt_pos[joint] + pose[:3, 3]),
             lower=lower,
             upper=upper,
             start=min(max(0.0, lower), upper),
@@ -296,7 +293,9 @@ class _Reading:
             if name and body in self._poses:
                 pose = pose_matrix(model.site_pos[site], model.site_quat[site])
                 pose = self._poses[body] @ pose
-                found[identifier(name)] = NamedPoint(_place(pose[:3, 3]), _turn(pose[:3, :3]))
+                found[identifier(name)] = NamedPoint(
+                    rounded_place(pose[:3, 3]), _turn(pose[:3, :3])
+                )
         return found
 
 
@@ -318,15 +317,5 @@ def _handled(
     return {UPRIGHT: IDENTITY}, grasps
 
 
-def _place(numbers: Floats) -> Place:
-    x, y, z = (round(number, _DIGITS) + 0.0 for number in numbers.tolist())
-    return x, y, z
-
-
 def _turn(rotation: Floats) -> Quaternion:
-    return _rounded_turn(quaternion_of(rotation))
-
-
-def _rounded_turn(quaternion: Floats) -> Quaternion:
-    w, x, y, z = (round(number, _DIGITS) + 0.0 for number in quaternion.tolist())
-    return w, x, y, z
+    return rounded_turn(quaternion_of(rotation))

@@ -1,4 +1,4 @@
-"""Pages that are single files: templates filled in, and what all of them look like."""
+"""HTML: pages that are single files, what they look like, and what notebooks show."""
 
 from __future__ import annotations
 
@@ -11,6 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+
+
+from collections.abc import Sequence
+from html import escape
 
 COMMON = "robot_layouts.core"
 
@@ -109,3 +113,20 @@ def data_address(kind: str, content: bytes) -> str:
 def plural(count: int, word: str) -> str:
     """Return a number of things, in words."""
     return f"{count:,} {word}" + ("" if count == 1 else "s")
+
+
+_CELL = ' style="text-align: left; padding: 0 1em 0 0"'
+
+
+def heading(title: str, text: str) -> str:
+    """Return a title in bold and a text behind it."""
+    return f"<div><b>{escape(title)}</b>: {escape(text)}</div>"
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table of texts."""
+    first = "".join(f"<th{_CELL}>{escape(head)}</th>" for head in heads)
+    others = ("".join(f"<td{_CELL}>{escape(cell)}</td>" for cell in row) for row in rows)
+    head = f"<thead><tr>{first}</tr></thead>" if heads else ""
+    body = "".join(f"<tr>{cells}</tr>" for cells in others)
+    return f"<table>{head}<tbody>{body}</tbody></table>"

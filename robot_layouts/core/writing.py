@@ -1,6 +1,7 @@
 """Files and folders that appear whole or not at all, and what the disk refuses, in words.
 
-New files for a user to go on with are never written over what is there.
+New files for a user to go on with are never written over what is there. What several writers of
+recordings and data sets need of the disk is here, too.
 """
 
 from __future__ import annotations
@@ -11,13 +12,16 @@ import re
 import shutil
 import sys
 from collections.abc import Generator, Mapping
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from importlib.machinery import PathFinder
+from io import FileIO
 from itertools import count
 from keyword import iskeyword
 from pathlib import Path
+from typing import Any
 
-from robot_layouts.core.errors import RobotLayoutsError, UnwritableFileError
+from robot_layouts.core.errors import RecordingError, RobotLayoutsError, UnwritableFileError
+from robot_layouts.core.operating_system import lock, open_folder
 from robot_layouts.core.own_packages import PACKAGES
 
 PARTIAL = ".partial"  # in the names of files and folders that are not whole yet
@@ -222,3 +226,92 @@ def _reason(refusal: Exception) -> str:
     if number is not None:
         return os.strerror(int(number[1]))
     return (refusal.strerror if isinstance(refusal, OSError) else None) or str(refusal)
+
+
+def disk_errors(path: Path) -> AbstractContextManager[None]:
+    """Turn what the disk refuses into one of our errors; h5py says it in several ways."""
+    return writing_errors(path, RecordingError, (OSError, RuntimeError, ValueError))
+
+
+def claim(folder: Path, *, certain: bool = False) -> int | None:
+    """Make a folder, unless it is there, and lock it; no file of the lock lies beside the user's.
+
+    Args:
+        folder: The folder.
+        certain: Whether to return None where the file or the operating system has no locks.
+
+    Returns:
+        An open descriptor that holds the lock until it is closed, which the death of the process
+        does too; None if another process holds it.
+    """
+    while True:
+        with suppress(FileExistsError):
+            folder.mkdir()
+        try:
+            descriptor = open_folder(folder)
+        except FileNotFoundError:  # the process that held the lock has just removed the folder
+            if folder.is_symlink():
+                raise
+            continue
+        if descriptor is None:  # this system locks no folders
+            return None if certain else os.open(os.devnull, os.O_RDONLY)
+        try:
+            lock(descriptor)
+        except BlockingIOError:
+            os.close(descriptor)
+            return None
+        except OSError:
+            if certain:
+                os.close(descriptor)
+                return None
+            return descriptor
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), folder.stat()):
+                return descriptor
+        os.close(descriptor)  # the folder was removed after it was opened
+
+
+class DiskFile(FileIO):
+    """A file for HDF5 to write to, which crashes the process where a disk refuses a write to it.
+
+    HDF5 is given it as a file object. It keeps the first refusal of the disk for `refusals`, and
+    then writes no more. It takes no memory, however large the file becomes.
+    """
+
+    _refusal: OSError | None = None
+
+    def write(self, data: Any, /) -> int:
+        """Write all of ``data``, unless the disk has refused something."""
+        rest = memoryview(data).cast("B")
+        size = len(rest)
+        with self._kept_refusal():
+            while rest and self._refusal is None:
+                rest = rest[super().write(rest) :]
+        return size
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Change the size, unless the disk has refused something."""
+        with self._kept_refusal():
+            if self._refusal is None:
+                super().truncate(size)
+        return self.tell() if size is None else size
+
+    @contextmanager
+    def refusals(self) -> Generator[None]:
+        """Raise at the end of the block what the disk refused; it explains whatever HDF5 says.
+
+        Raises:
+            OSError: If it did.
+        """
+        try:
+            yield
+        finally:
+            if self._refusal is not None:
+                raise self._refusal
+
+    @contextmanager
+    def _kept_refusal(self) -> Generator[None]:
+        try:
+            yield
+        except OSError as refusal:
+            self._refusal = refusal

@@ -19,7 +19,7 @@ from robots.urdf.model import UrdfModel
 from robots.urdf.paths import resolve
 from robots.urdf.reading import model_of
 from robots.urdf.summary import root_of
-from robots.urdf.writing import joint_element, origin_at
+from robots.urdf.text import joint_element, origin_at
 
 URDF = "assembled.urdf"
 

@@ -8,11 +8,9 @@ from pathlib import Path
 
 from robot_layouts.core.errors import AssetError
 from robot_layouts.core.paths import default_root
-from robots.assets.manifest import AssetFile, load_manifest
-from robots.assets.packages import INDEX_PACKAGES, SourceError
-from robots.assets.progress import listing, say, size
+from robots.assets.manifest import INDEX_PACKAGES, AssetFile, SourceError, load_manifest
 from robots.assets.sources import AssetSource, HubSource, InstalledPackage, PackageWheel
-from robots.assets.store import AssetStore, FileState
+from robots.assets.store import AssetStore, FileState, listing, say, size
 
 
 def locate(package: str, urdf: str, *, pictures: bool) -> Path:

@@ -105,3 +105,9 @@ def opened_path(path: str | os.PathLike[str], folder: str | os.PathLike[str] | N
     if folder is not None:
         open_folder(file.as_posix(), absolute(folder, "folder").as_posix())
     return file
+
+
+# What stands around robots in pictures; physics needs none of it.
+SCENERY = "maniskill_tabletop"  # a package of the manifest
+TABLE = FileLocator(SCENERY, "scene_builder/table/assets/table.glb")
+GROUND_TEXTURE = FileLocator(SCENERY, "building/assets/grid_texture.png")

@@ -11,21 +11,19 @@ import sys
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from importlib.util import find_spec
+from json import JSONDecodeError
 from lzma import LZMAError
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import open_regular
 from robot_layouts.core.progress import Progress
-from robots.assets.hub_client import ENDPOINT_VARIABLE, silent_bar, why
-from robots.assets.manifest import AssetFile, load_manifest
-from robots.assets.packages import IndexPackage, SourceError, find_package
-from robots.assets.progress import listing, say
-from robots.assets.store import AssetStore, FileState
+from robots.assets.manifest import AssetFile, IndexPackage, SourceError, find_package, load_manifest
+from robots.assets.store import AssetStore, FileState, listing, say
 
 REVISION_VARIABLE = "ROBOT_LAYOUTS_HF_REVISION"
 
@@ -365,3 +363,39 @@ def _expect_none(absent: Sequence[str]) -> None:
     """
     if absent:
         raise SourceError(f"lacks {len(absent)} files: {listing(absent)}")
+
+
+ENDPOINT_VARIABLE = "HF_ENDPOINT"
+
+
+def silent_bar() -> type[Any]:
+    """Return a progress bar for the Hub's client that shows nothing."""
+    from tqdm import tqdm
+
+    class SilentBar(tqdm):  # pyright: ignore[reportMissingTypeArgument]
+        def __init__(self, *args: Any, **settings: Any) -> None:
+            super().__init__(*args, **{**settings, "disable": True})
+
+    return SilentBar
+
+
+def why(error: BaseException, statuses: Mapping[int, str]) -> str:
+    """Return in one line why the Hub's client failed.
+
+    Args:
+        error: What it raised.
+        statuses: What HTTP errors mean here, by number.
+    """
+    from huggingface_hub.errors import LocalEntryNotFoundError
+
+    if isinstance(error, LocalEntryNotFoundError) and error.__cause__ is not None:
+        return why(error.__cause__, statuses)
+    status = getattr(getattr(error, "response", None), "status_code", None)
+    if status is not None:
+        return statuses.get(status, f"HTTP error {status}")
+    if isinstance(error, OSError) and error.errno:
+        return f"the Hub's cache cannot be written: {error.strerror}: {error.filename}"
+    if isinstance(error, JSONDecodeError):
+        return "the server answers with something that is not JSON, such as a login page"
+    first_line = str(error).strip().partition("\n")[0]
+    return f"{type(error).__name__}: {first_line}"

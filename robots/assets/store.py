@@ -6,7 +6,7 @@ import errno
 import hashlib
 import os
 import shutil
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -14,12 +14,31 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from robot_layouts.core.commands import notice, printable
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import open_regular
 from robot_layouts.core.paths import ROOT_VARIABLE
 from robot_layouts.core.writing import remove, written_whole
 from robots.assets.manifest import AssetFile
-from robots.assets.progress import say
+
+
+def say(text: str) -> None:
+    """Print one line; no name in it steers the terminal."""
+    notice(f"robot files: {printable(text)}")
+
+
+def size(count: int) -> str:
+    """Return a number of bytes as people write it."""
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"
+
+
+def listing(entries: Sequence[str], separator: str = ", ", most: int = 12) -> str:
+    """Return entries as a list for a message, and how many more there are beyond the first."""
+    shown = list(entries[:most])
+    if len(entries) > most:
+        shown.append(f"and {len(entries) - most} more")
+    return separator.join(shown)
+
 
 _LOCK, _PARTIAL = ".lock", ".partial"
 _ABSENT = (errno.ENOENT, errno.ENOTDIR)

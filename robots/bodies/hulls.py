@@ -25,7 +25,7 @@ from robots.urdf.mesh_files import has_volume, read_corners, read_mesh, refers_t
 from robots.urdf.model import UrdfModel, UrdfShape
 from robots.urdf.paths import resolve
 from robots.urdf.reading import model_of
-from robots.urdf.srdf import srdf_beside
+from robots.urdf.summary import srdf_beside
 from robots.urdf.tree import kinematic_tree
 
 SIDES = 32  # of the polygon that stands for a circle; 0.5 % of the radius is lost

@@ -1,7 +1,7 @@
 """Wonik Allegro right hand, four fingers of four joints: 16 action numbers."""
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, RobotDescriptor
+from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, RobotDescriptor, names
 
 FINGER = ((-0.47, 0.47), (-0.196, 1.61), (-0.174, 1.709), (-0.227, 1.618))
 THUMB = ((0.263, 1.396), (-0.105, 1.163), (-0.189, 1.644), (-0.162, 1.719))
@@ -12,24 +12,7 @@ ALLEGRO_HAND_RIGHT = RobotDescriptor(
     urdf=UrdfLocator("maniskill_allegro", "allegro_hand_right_glb.urdf"),
     action_split=ActionSplit(
         fingers=JointGroup(
-            (
-                "joint_0.0",
-                "joint_1.0",
-                "joint_2.0",
-                "joint_3.0",
-                "joint_4.0",
-                "joint_5.0",
-                "joint_6.0",
-                "joint_7.0",
-                "joint_8.0",
-                "joint_9.0",
-                "joint_10.0",
-                "joint_11.0",
-                "joint_12.0",
-                "joint_13.0",
-                "joint_14.0",
-                "joint_15.0",
-            ),
+            names("joint_", 0, 15, ".0"),
             lower=-0.1,
             upper=0.1,
             delta=True,

@@ -3,8 +3,15 @@
 from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, RobotDescriptor
-from robots.parts import among, both_sides
+from robots.descriptor import (
+    ActionSplit,
+    Fingers,
+    GripperMaterial,
+    JointGroup,
+    Limb,
+    RobotDescriptor,
+)
+from robots.parts import among, both_sides, mirrored
 
 BODY = ("torso", "sonar_ring", "pedestal", "collision_head_link_1", "collision_head_link_2")
 LEFT_ARM = JointGroup(
@@ -39,6 +46,31 @@ LEFT_GRIPPER = JointGroup(
     reset_noise=False,
     limits=((0.0, 0.020833), (-0.020833, 0.0)),
 )
+TIPS = ("l_gripper_l_finger_tip", "l_gripper_r_finger_tip")
+FINGERS = ("l_gripper_l_finger", "l_gripper_r_finger")
+HAND = ("left_wrist", "left_hand_link", "left_gripper_base_link")
+LEFT_ARM_LINKS = (
+    (
+        "left_upper_shoulder",
+        "left_lower_shoulder",
+        "left_upper_elbow_visual",
+        "left_upper_elbow",
+        "left_lower_elbow",
+    ),
+    (
+        "left_upper_elbow",
+        "left_lower_elbow",
+        "left_upper_forearm",
+        "left_upper_forearm_visual",
+        "left_lower_forearm",
+        "left_wrist",
+    ),
+    ("left_lower_forearm", "left_wrist", "left_hand_link", "left_gripper_base_link"),
+)
+LEFT_FINGER_LINKS = (
+    (*HAND, "l_gripper_l_finger", "l_gripper_l_finger_tip"),
+    (*HAND, "l_gripper_r_finger", "l_gripper_r_finger_tip"),
+)
 REST = (-0.55, 0.0, 0.75, 0.0, 1.26, 0.0, 0.020833, -0.020833)  # "neutral", arms turned in
 
 BAXTER = RobotDescriptor(
@@ -47,47 +79,16 @@ BAXTER = RobotDescriptor(
     action_split=ActionSplit(
         left_arm=LEFT_ARM,
         left_gripper=LEFT_GRIPPER,
-        right_arm=replace(
-            LEFT_ARM,
-            joints=(
-                "right_s0",
-                "right_s1",
-                "right_e0",
-                "right_e1",
-                "right_w0",
-                "right_w1",
-                "right_w2",
-            ),
-        ),
-        right_gripper=replace(
-            LEFT_GRIPPER, joints=("r_gripper_l_finger_joint", "r_gripper_r_finger_joint")
-        ),
+        right_arm=replace(LEFT_ARM, joints=mirrored(LEFT_ARM.joints)),
+        right_gripper=replace(LEFT_GRIPPER, joints=mirrored(LEFT_GRIPPER.joints)),
         head=JointGroup.hold(("head_pan",)),
     ),
     tcp_link="left_gripper",
-    fingers=Fingers(("l_gripper_l_finger_tip", "l_gripper_r_finger_tip")),
+    fingers=Fingers(TIPS),
     gripper_material=GripperMaterial(
-        (
-            "l_gripper_l_finger_tip",
-            "l_gripper_r_finger_tip",
-            "r_gripper_l_finger_tip",
-            "r_gripper_r_finger_tip",
-            "l_gripper_l_finger",
-            "l_gripper_r_finger",
-            "r_gripper_l_finger",
-            "r_gripper_r_finger",
-        ),
-        2.0,
-        2.0,
-        0.0,
-        0.1,
+        (*TIPS, *mirrored(TIPS), *FINGERS, *mirrored(FINGERS)), 2.0, 2.0, 0.0, 0.1
     ),
-    limbs=both_sides(
-        "{side}_gripper",
-        1.201,
-        (0.064, 0.259, 0.1296),
-        Fingers(("{s}_gripper_l_finger_tip", "{s}_gripper_r_finger_tip")),
-    ),
+    limbs=both_sides(Limb("left_gripper", 1.201, (0.064, 0.259, 0.1296), Fingers(TIPS))),
     keyframes={"rest": (-0.3, *REST, 0.3, *REST, 0.0)},
     reach=1.468,  # of the left TCP, from the URDF; data sheet 1.21 from the shoulder
     source="example-robot-data 6.0.0, baxter_description; drives from each joint's inertia",
@@ -95,67 +96,11 @@ BAXTER = RobotDescriptor(
         (*BODY, "head", "screen"),
         (*BODY, "left_upper_shoulder", "left_lower_shoulder"),
         (*BODY, "right_upper_shoulder", "right_lower_shoulder"),
-        (
-            "left_upper_shoulder",
-            "left_lower_shoulder",
-            "left_upper_elbow_visual",
-            "left_upper_elbow",
-            "left_lower_elbow",
-        ),
-        (
-            "left_upper_elbow",
-            "left_lower_elbow",
-            "left_upper_forearm",
-            "left_upper_forearm_visual",
-            "left_lower_forearm",
-            "left_wrist",
-        ),
-        ("left_lower_forearm", "left_wrist", "left_hand_link", "left_gripper_base_link"),
-        (
-            "right_upper_shoulder",
-            "right_lower_shoulder",
-            "right_upper_elbow_visual",
-            "right_upper_elbow",
-            "right_lower_elbow",
-        ),
-        (
-            "right_upper_elbow",
-            "right_lower_elbow",
-            "right_upper_forearm",
-            "right_upper_forearm_visual",
-            "right_lower_forearm",
-            "right_wrist",
-        ),
-        ("right_lower_forearm", "right_wrist", "right_hand_link", "right_gripper_base_link"),
-        (
-            "left_wrist",
-            "left_hand_link",
-            "left_gripper_base_link",
-            "l_gripper_l_finger",
-            "l_gripper_l_finger_tip",
-        ),
-        (
-            "left_wrist",
-            "left_hand_link",
-            "left_gripper_base_link",
-            "l_gripper_r_finger",
-            "l_gripper_r_finger_tip",
-        ),
-        (
-            "right_wrist",
-            "right_hand_link",
-            "right_gripper_base_link",
-            "r_gripper_l_finger",
-            "r_gripper_l_finger_tip",
-        ),
-        (
-            "right_wrist",
-            "right_hand_link",
-            "right_gripper_base_link",
-            "r_gripper_r_finger",
-            "r_gripper_r_finger_tip",
-        ),
-        ("l_gripper_l_finger", "l_gripper_r_finger"),
-        ("r_gripper_l_finger", "r_gripper_r_finger"),
+        *LEFT_ARM_LINKS,
+        *mirrored(LEFT_ARM_LINKS),
+        *LEFT_FINGER_LINKS,
+        *mirrored(LEFT_FINGER_LINKS),
+        FINGERS,
+        mirrored(FINGERS),
     ),
 )

@@ -52,9 +52,11 @@ INDEX = JointGroup(
     offsets=(0.0, -0.167348),
     reset_noise=False,
 )
-# From the palm on: what grips.
-GRIPPING = (
+LINKS = (
+    "right_hand_wrist_base_link",
+    "right_hand_wrist_link",
     "right_hand_hand_base_link",
+    "right_hand_thumb_metacarpal_base",
     "right_hand_thumb_metacarpal",
     "right_hand_thumb_proximal",
     "right_hand_thumb_distal",
@@ -67,6 +69,7 @@ GRIPPING = (
     "right_hand_pinky_proximal",
     "right_hand_pinky_middle",
 )
+GRIPPING = (LINKS[2], *LINKS[4:])  # from the palm on
 
 FIXED_INSPIRE_HAND_RIGHT = RobotDescriptor(
     name="fixed_inspire_hand_right",
@@ -90,22 +93,6 @@ FIXED_INSPIRE_HAND_RIGHT = RobotDescriptor(
     reach=0.14,  # of the thumb's and the first finger's tips, from the URDF
     source="mani_skill 3.0.1, agents/robots/inspire_hand/fixed_inspire_hand.py",
     allowed_collisions=among(  # as ManiSkill, which lets the hand overlap
-        (
-            "right_hand_wrist_base_link",
-            "right_hand_wrist_link",
-            "right_hand_hand_base_link",
-            "right_hand_thumb_metacarpal_base",
-            "right_hand_thumb_metacarpal",
-            "right_hand_thumb_proximal",
-            "right_hand_thumb_distal",
-            "right_hand_index_proximal",
-            "right_hand_index_middle",
-            "right_hand_middle_proximal",
-            "right_hand_middle_middle",
-            "right_hand_ring_proximal",
-            "right_hand_ring_middle",
-            "right_hand_pinky_proximal",
-            "right_hand_pinky_middle",
-        )
+        LINKS
     ),
 )

@@ -5,7 +5,7 @@ from dataclasses import replace
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.mobile_panda import BASE, LIFT, MOBILE_PANDA
 from robots.catalogue.panda import ARM, PANDA
-from robots.descriptor import ActionSplit, Fingers, GripperMaterial, names
+from robots.descriptor import ActionSplit, Fingers, GripperMaterial, Limb, names
 from robots.parts import among, both_sides
 
 LEFT = ("left_panda_leftfinger", "left_panda_rightfinger")
@@ -28,12 +28,7 @@ MOBILE_PANDA_DUAL = replace(
     tcp_link="left_panda_hand_tcp",
     gripper_material=GripperMaterial(FINGERS, 2.0, 2.0, 0.0, patch_radius=0.1),
     fingers=Fingers(LEFT),
-    limbs=both_sides(
-        "{side}_panda_hand_tcp",
-        0.947,
-        (0.0808, 0.3012, 0.42),
-        Fingers(("{side}_panda_leftfinger", "{side}_panda_rightfinger")),
-    ),
+    limbs=both_sides(Limb("left_panda_hand_tcp", 0.947, (0.0808, 0.3012, 0.42), Fingers(LEFT))),
     allowed_collisions=among(
         ("left_panda_link7", "left_panda_hand"), ("right_panda_link7", "right_panda_hand")
     ),

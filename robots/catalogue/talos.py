@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, RobotDescriptor
-from robots.parts import among, both_sides
+from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, Limb, RobotDescriptor, names
+from robots.parts import among, both_sides, mirrored
 
 LIMITS = (
     (-2.443461, 2.443461),
@@ -14,15 +14,7 @@ LIMITS = (
     (-0.6981317, 0.6981317),
 )
 LEFT_ARM = JointGroup(
-    (
-        "arm_left_1_joint",
-        "arm_left_2_joint",
-        "arm_left_3_joint",
-        "arm_left_4_joint",
-        "arm_left_5_joint",
-        "arm_left_6_joint",
-        "arm_left_7_joint",
-    ),
+    names("arm_left_", 1, 7, "_joint"),
     lower=(*(-0.04,) * 4, -0.065, -0.1, -0.1),
     upper=(*(0.04,) * 4, 0.065, 0.1, 0.1),
     stiffness=(4.17e4, 3.06e4, 8410.0, 7410.0, 1000.0, 1000.0, 1000.0),
@@ -34,15 +26,7 @@ LEFT_ARM = JointGroup(
 )
 RIGHT_ARM = replace(
     LEFT_ARM,
-    joints=(
-        "arm_right_1_joint",
-        "arm_right_2_joint",
-        "arm_right_3_joint",
-        "arm_right_4_joint",
-        "arm_right_5_joint",
-        "arm_right_6_joint",
-        "arm_right_7_joint",
-    ),
+    joints=mirrored(LEFT_ARM.joints),
     limits=((-0.5235988, 1.5707964), (-2.8797932, 0.0), *LIMITS),
 )
 LEFT_GRIPPER = JointGroup(
@@ -65,23 +49,8 @@ LEFT_HAND = (
     "gripper_left_inner_single_link",
     "gripper_left_fingertip_3_link",
 )
-LEFT_WRIST = (
-    "arm_left_5_link",
-    "arm_left_6_link",
-    "arm_left_7_link",
-    "wrist_left_ft_link",
-    "wrist_left_ft_tool_link",
-)
-RIGHT_HAND = (
-    "gripper_right_base_link",
-    "gripper_right_motor_double_link",
-    "gripper_right_inner_double_link",
-    "gripper_right_fingertip_1_link",
-    "gripper_right_fingertip_2_link",
-    "gripper_right_motor_single_link",
-    "gripper_right_inner_single_link",
-    "gripper_right_fingertip_3_link",
-)
+LEFT_WRIST = (*names("arm_left_", 5, 7, "_link"), "wrist_left_ft_link", "wrist_left_ft_tool_link")
+LEFT_LEG = names("leg_left_", 1, 6, "_joint")
 LEFT_REST = (-0.3, 0.8, -0.4, -1.7, -0.5, 0.2, 0.0, 0.0)
 RIGHT_REST = (0.3, -0.8, 0.4, -1.7, 0.5, -0.2, 0.0, 0.0)
 
@@ -92,48 +61,20 @@ TALOS = RobotDescriptor(
         left_arm=LEFT_ARM,
         left_gripper=LEFT_GRIPPER,
         right_arm=RIGHT_ARM,
-        right_gripper=replace(LEFT_GRIPPER, joints=("gripper_right_joint",)),
+        right_gripper=replace(LEFT_GRIPPER, joints=mirrored(LEFT_GRIPPER.joints)),
         torso=JointGroup.hold(("torso_1_joint", "torso_2_joint")),
         head=JointGroup.hold(("head_1_joint", "head_2_joint")),
-        legs=JointGroup.hold(
-            (
-                "leg_left_1_joint",
-                "leg_left_2_joint",
-                "leg_left_3_joint",
-                "leg_left_4_joint",
-                "leg_left_5_joint",
-                "leg_left_6_joint",
-                "leg_right_1_joint",
-                "leg_right_2_joint",
-                "leg_right_3_joint",
-                "leg_right_4_joint",
-                "leg_right_5_joint",
-                "leg_right_6_joint",
-            )
-        ),
+        legs=JointGroup.hold((*LEFT_LEG, *mirrored(LEFT_LEG))),
     ),
     tcp_link="gripper_left_fingertip_2_link",
-    gripper_material=GripperMaterial(
-        (*LEFT_HAND, *RIGHT_HAND),
-        2.0,
-        2.0,
-        0.0,
-        0.1,
-    ),
+    gripper_material=GripperMaterial((*LEFT_HAND, *mirrored(LEFT_HAND)), 2.0, 2.0, 0.0, 0.1),
     keyframes={"rest": (*LEFT_REST, *RIGHT_REST, *(0,) * 16)},
-    limbs=both_sides("gripper_{side}_fingertip_2_link", 0.898, (0.0, 0.1575, 0.3042)),
+    limbs=both_sides(Limb("gripper_left_fingertip_2_link", 0.898, (0.0, 0.1575, 0.3042))),
     reach=1.055,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, talos_data; drives from the inertia behind each joint",
     allowed_collisions=among(
         (*LEFT_WRIST, *LEFT_HAND),
-        (
-            "arm_right_5_link",
-            "arm_right_6_link",
-            "arm_right_7_link",
-            "wrist_right_ft_link",
-            "wrist_right_ft_tool_link",
-            *RIGHT_HAND,
-        ),
+        mirrored((*LEFT_WRIST, *LEFT_HAND)),
         ("leg_left_1_link", "leg_left_3_link"),
         ("leg_left_4_link", "leg_left_6_link"),
         ("leg_right_1_link", "leg_right_3_link"),

@@ -1,19 +1,11 @@
 """PAL Robotics TIAGo without a hand, whose base and torso stand still: 7 action numbers."""
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
+from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor, names
 from robots.parts import among
 
 ARM = JointGroup(
-    (
-        "arm_1_joint",
-        "arm_2_joint",
-        "arm_3_joint",
-        "arm_4_joint",
-        "arm_5_joint",
-        "arm_6_joint",
-        "arm_7_joint",
-    ),
+    names("arm_", 1, 7, "_joint"),
     lower=(-0.04, -0.04, -0.055, -0.065, -0.1, -0.1, -0.1),
     upper=(0.04, 0.04, 0.055, 0.065, 0.1, 0.1, 0.1),
     stiffness=(4.06e4, 2.42e4, 4510.0, 3840.0, 1000.0, 1000.0, 1000.0),
@@ -34,6 +26,16 @@ ARM = JointGroup(
 TORSO_SLIDE = JointGroup.hold(("torso_lift_joint",), unit="m")
 HEAD = JointGroup.hold(("head_1_joint", "head_2_joint"))
 WHEELS = JointGroup.hold(("wheel_right_joint", "wheel_left_joint"))
+BASE = (
+    "base_antenna_left_link",
+    "base_antenna_right_link",
+    "caster_back_left_2_link",
+    "caster_back_right_2_link",
+    "caster_front_left_2_link",
+    "caster_front_right_2_link",
+    "torso_fixed_column_link",
+    "torso_fixed_link",
+)
 
 TIAGO = RobotDescriptor(
     name="tiago",
@@ -44,39 +46,9 @@ TIAGO = RobotDescriptor(
     reach=0.891,  # of the TCP, from the URDF
     source="example-robot-data 6.0.0, tiago_description; drives from each joint's inertia",
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
-        (
-            "base_antenna_left_link",
-            "base_antenna_right_link",
-            "base_link",
-            "caster_back_left_2_link",
-            "caster_back_right_2_link",
-            "caster_front_left_2_link",
-            "caster_front_right_2_link",
-            "torso_fixed_column_link",
-            "torso_lift_link",
-        ),
-        (
-            "base_antenna_left_link",
-            "base_antenna_right_link",
-            "caster_back_left_2_link",
-            "caster_back_right_2_link",
-            "caster_front_left_2_link",
-            "caster_front_right_2_link",
-            "torso_fixed_column_link",
-            "torso_fixed_link",
-            "wheel_left_link",
-        ),
-        (
-            "base_antenna_left_link",
-            "base_antenna_right_link",
-            "caster_back_left_2_link",
-            "caster_back_right_2_link",
-            "caster_front_left_2_link",
-            "caster_front_right_2_link",
-            "torso_fixed_column_link",
-            "torso_fixed_link",
-            "wheel_right_link",
-        ),
+        (*BASE[:2], "base_link", *BASE[2:7], "torso_lift_link"),
+        (*BASE, "wheel_left_link"),
+        (*BASE, "wheel_right_link"),
         ("arm_6_link", "arm_tool_link", "wrist_ft_link", "wrist_ft_tool_link"),
         ("arm_1_link", "torso_fixed_column_link"),
     ),

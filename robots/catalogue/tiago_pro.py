@@ -3,11 +3,19 @@
 from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, RobotDescriptor
-from robots.parts import among, both_sides
+from robots.descriptor import (
+    ActionSplit,
+    Fingers,
+    GripperMaterial,
+    JointGroup,
+    Limb,
+    RobotDescriptor,
+    names,
+)
+from robots.parts import among, both_sides, mirrored
 
 BEND, WRIST, TURN = (-2.443461, 1.134464), (-1.8849556, 3.0019662), (-2.6179938, 2.6179938)
-TIPS = ("gripper_{side}_fingertip_left_link", "gripper_{side}_fingertip_right_link")
+TIPS = ("gripper_left_fingertip_left_link", "gripper_left_fingertip_right_link")
 OPEN = 0.80285144  # rad
 FINGERS = Fingers(
     TIPS,
@@ -15,8 +23,6 @@ FINGERS = Fingers(
     max_angle=110.0,
     opening_axes=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),  # as the tips part
 )
-LEFT_TIPS = ("gripper_left_fingertip_left_link", "gripper_left_fingertip_right_link")
-RIGHT_TIPS = ("gripper_right_fingertip_left_link", "gripper_right_fingertip_right_link")
 BASE = (
     "base_link",
     "base_antenna_left_link",
@@ -31,15 +37,7 @@ BASE = (
     "suspension_rear_right_link",
 )
 LEFT_ARM = JointGroup(
-    (
-        "arm_left_1_joint",
-        "arm_left_2_joint",
-        "arm_left_3_joint",
-        "arm_left_4_joint",
-        "arm_left_5_joint",
-        "arm_left_6_joint",
-        "arm_left_7_joint",
-    ),
+    names("arm_left_", 1, 7, "_joint"),
     lower=(*(-0.04,) * 4, *(-0.1,) * 3),
     upper=(*(0.04,) * 4, *(0.1,) * 3),
     stiffness=(2.57e4, 3.23e4, 8480.0, 7940.0, 1000.0, 1000.0, 1000.0),
@@ -51,15 +49,7 @@ LEFT_ARM = JointGroup(
 )
 RIGHT_ARM = replace(
     LEFT_ARM,
-    joints=(
-        "arm_right_1_joint",
-        "arm_right_2_joint",
-        "arm_right_3_joint",
-        "arm_right_4_joint",
-        "arm_right_5_joint",
-        "arm_right_6_joint",
-        "arm_right_7_joint",
-    ),
+    joints=mirrored(LEFT_ARM.joints),
     limits=((-4.712389, 0.5235988), BEND, TURN, BEND, (-1.5707964, 3.6651914), WRIST, TURN),
 )
 LEFT_GRIPPER = JointGroup(  # one motor moves both linkages
@@ -81,6 +71,16 @@ LEFT_GRIPPER = JointGroup(  # one motor moves both linkages
     offsets=(*(OPEN,) * 4, *(-OPEN,) * 2),
     reset_noise=False,
 )
+LEFT_HAND = (
+    "arm_left_7_link",
+    "gripper_left_base_link",
+    "gripper_left_inner_finger_left_link",
+    "gripper_left_outer_finger_left_link",
+    "gripper_left_fingertip_left_link",
+    "gripper_left_inner_finger_right_link",
+    "gripper_left_outer_finger_right_link",
+    "gripper_left_fingertip_right_link",
+)
 
 TIAGO_PRO = RobotDescriptor(
     name="tiago_pro",
@@ -89,17 +89,7 @@ TIAGO_PRO = RobotDescriptor(
         left_arm=LEFT_ARM,
         left_gripper=LEFT_GRIPPER,
         right_arm=RIGHT_ARM,
-        right_gripper=replace(
-            LEFT_GRIPPER,
-            joints=(
-                "gripper_right_finger_joint",
-                "gripper_right_inner_finger_left_joint",
-                "gripper_right_outer_finger_right_joint",
-                "gripper_right_inner_finger_right_joint",
-                "gripper_right_fingertip_left_joint",
-                "gripper_right_fingertip_right_joint",
-            ),
-        ),
+        right_gripper=replace(LEFT_GRIPPER, joints=mirrored(LEFT_GRIPPER.joints)),
         torso=JointGroup.hold(("torso_lift_joint",), unit="m"),
         head=JointGroup.hold(("head_1_joint", "head_2_joint")),
         wheels=JointGroup.hold(
@@ -112,9 +102,9 @@ TIAGO_PRO = RobotDescriptor(
         ),
     ),
     tcp_link="gripper_left_base_link",
-    tcp_position_links=LEFT_TIPS,
-    fingers=replace(FINGERS, links=LEFT_TIPS),
-    gripper_material=GripperMaterial((*LEFT_TIPS, *RIGHT_TIPS), 2.0, 2.0, 0.0, patch_radius=0.1),
+    tcp_position_links=TIPS,
+    fingers=FINGERS,
+    gripper_material=GripperMaterial((*TIPS, *mirrored(TIPS)), 2.0, 2.0, 0.0, patch_radius=0.1),
     keyframes={
         "rest": (
             0.343331,
@@ -135,7 +125,9 @@ TIAGO_PRO = RobotDescriptor(
             *(0,) * 13,
         )
     },
-    limbs=both_sides("gripper_{side}_base_link", 1.032, (0.0653, 0.1592, 0.7537), FINGERS, TIPS),
+    limbs=both_sides(
+        Limb("gripper_left_base_link", 1.032, (0.0653, 0.1592, 0.7537), FINGERS, TIPS)
+    ),
     reach=1.2,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, tiago_pro_description; drives from each joint's inertia",
     allowed_collisions=among(
@@ -144,26 +136,8 @@ TIAGO_PRO = RobotDescriptor(
         (*BASE, "wheel_front_right_link"),
         (*BASE, "wheel_rear_left_link"),
         (*BASE, "wheel_rear_right_link"),
-        (
-            "arm_left_7_link",
-            "gripper_left_base_link",
-            "gripper_left_inner_finger_left_link",
-            "gripper_left_outer_finger_left_link",
-            "gripper_left_fingertip_left_link",
-            "gripper_left_inner_finger_right_link",
-            "gripper_left_outer_finger_right_link",
-            "gripper_left_fingertip_right_link",
-        ),
-        (
-            "arm_right_7_link",
-            "gripper_right_base_link",
-            "gripper_right_inner_finger_left_link",
-            "gripper_right_outer_finger_left_link",
-            "gripper_right_fingertip_left_link",
-            "gripper_right_inner_finger_right_link",
-            "gripper_right_outer_finger_right_link",
-            "gripper_right_fingertip_right_link",
-        ),
+        LEFT_HAND,
+        mirrored(LEFT_HAND),
         ("arm_left_6_link", "gripper_left_base_link"),
         ("arm_right_6_link", "gripper_right_base_link"),
         ("head_1_link", "head_front_camera_link", "torso_lift_link"),

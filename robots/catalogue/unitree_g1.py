@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, JointGroup, RobotDescriptor
-from robots.parts import among, both_sides
+from robots.descriptor import ActionSplit, JointGroup, Limb, RobotDescriptor
+from robots.parts import among, both_sides, mirrored
 
 PITCH, YAW, ELBOW = (-3.0892, 2.6704), (-2.618, 2.618), (-1.0472, 2.0944)
 WRIST = ((-1.9722221, 1.9722221), (-1.6144296, 1.6144296), (-1.6144296, 1.6144296))
@@ -29,16 +29,16 @@ LEFT_ARM = JointGroup(
 )
 RIGHT_ARM = replace(
     LEFT_ARM,
-    joints=(
-        "right_shoulder_pitch_joint",
-        "right_shoulder_roll_joint",
-        "right_shoulder_yaw_joint",
-        "right_elbow_joint",
-        "right_wrist_roll_joint",
-        "right_wrist_pitch_joint",
-        "right_wrist_yaw_joint",
-    ),
+    joints=mirrored(LEFT_ARM.joints),
     limits=(PITCH, (-2.2515, 1.5882), YAW, ELBOW, *WRIST),
+)
+LEFT_LEG = (
+    "left_hip_pitch_joint",
+    "left_hip_roll_joint",
+    "left_hip_yaw_joint",
+    "left_knee_joint",
+    "left_ankle_pitch_joint",
+    "left_ankle_roll_joint",
 )
 
 UNITREE_G1 = RobotDescriptor(
@@ -48,26 +48,11 @@ UNITREE_G1 = RobotDescriptor(
         left_arm=LEFT_ARM,
         right_arm=RIGHT_ARM,
         torso=JointGroup.hold(("waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint")),
-        legs=JointGroup.hold(
-            (
-                "left_hip_pitch_joint",
-                "left_hip_roll_joint",
-                "left_hip_yaw_joint",
-                "left_knee_joint",
-                "left_ankle_pitch_joint",
-                "left_ankle_roll_joint",
-                "right_hip_pitch_joint",
-                "right_hip_roll_joint",
-                "right_hip_yaw_joint",
-                "right_knee_joint",
-                "right_ankle_pitch_joint",
-                "right_ankle_roll_joint",
-            )
-        ),
+        legs=JointGroup.hold((*LEFT_LEG, *mirrored(LEFT_LEG))),
     ),
     tcp_link="left_rubber_hand",
     keyframes={"rest": (0,) * 29},
-    limbs=both_sides("{side}_rubber_hand", 0.451, (0.0, 0.1002, 0.2918)),
+    limbs=both_sides(Limb("left_rubber_hand", 0.451, (0.0, 0.1002, 0.2918))),
     reach=0.552,  # of the left TCP, from the URDF
     source="example-robot-data 6.0.0, g1_description; drives from the inertia behind each joint",
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand

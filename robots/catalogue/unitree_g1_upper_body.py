@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
-from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, RobotDescriptor
-from robots.parts import among, both_sides
+from robots.descriptor import ActionSplit, GripperMaterial, Home, JointGroup, Limb, RobotDescriptor
+from robots.parts import among, both_sides, mirrored
 
 LEFT_ARM = JointGroup(
     (
@@ -57,13 +57,7 @@ LEFT_HAND = JointGroup(
 # The right side is the left one in a mirror.
 RIGHT_ARM = replace(
     LEFT_ARM,
-    joints=(
-        "right_shoulder_pitch_joint",
-        "right_shoulder_roll_joint",
-        "right_shoulder_yaw_joint",
-        "right_elbow_pitch_joint",
-        "right_elbow_roll_joint",
-    ),
+    joints=mirrored(LEFT_ARM.joints),
     limits=(
         (-2.9671, 2.7925),
         (-2.2515, 1.5882),
@@ -74,15 +68,7 @@ RIGHT_ARM = replace(
 )
 RIGHT_HAND = replace(
     LEFT_HAND,
-    joints=(
-        "right_zero_joint",
-        "right_one_joint",
-        "right_two_joint",
-        "right_three_joint",
-        "right_four_joint",
-        "right_five_joint",
-        "right_six_joint",
-    ),
+    joints=mirrored(LEFT_HAND.joints),
     limits=(
         (-0.523598, 0.523598),
         (-1.2, 1.0),
@@ -93,6 +79,16 @@ RIGHT_HAND = replace(
         (-0.0, 1.84),
     ),
 )
+LEFT_LINKS = (
+    "left_one_link",
+    "left_two_link",
+    "left_three_link",
+    "left_four_link",
+    "left_five_link",
+    "left_six_link",
+    "left_palm_link",
+)
+LEFT_NEIGHBOURS = (LEFT_LINKS[0], *LEFT_LINKS[2:], "left_elbow_roll_link")
 TORSO = replace(LEFT_ARM, joints=("torso_joint",), limits=((-2.618, 2.618),))
 
 UNITREE_G1_UPPER_BODY = RobotDescriptor(
@@ -107,51 +103,16 @@ UNITREE_G1_UPPER_BODY = RobotDescriptor(
     ),
     tcp_link="left_tcp_link",
     gripper_material=GripperMaterial(
-        (
-            "left_one_link",
-            "left_two_link",
-            "left_three_link",
-            "left_four_link",
-            "left_five_link",
-            "left_six_link",
-            "left_palm_link",
-            "right_one_link",
-            "right_two_link",
-            "right_three_link",
-            "right_four_link",
-            "right_five_link",
-            "right_six_link",
-            "right_palm_link",
-        ),
-        2.0,
-        2.0,
-        0.0,
-        patch_radius=0.1,
+        (*LEFT_LINKS, *mirrored(LEFT_LINKS)), 2.0, 2.0, 0.0, patch_radius=0.1
     ),
     keyframes={"standing": (0,) * 25, "rest": (0,) * 25},
     home=Home(position=(0.0, 0.0, 0.755)),
-    limbs=both_sides("{side}_tcp_link", 0.531, (-0.0025, 0.104, 0.2593)),
+    limbs=both_sides(Limb("left_tcp_link", 0.531, (-0.0025, 0.104, 0.2593))),
     reach=0.64,  # of the left TCP, from the URDF
     source="mani_skill 3.0.1, agents/robots/unitree_g1/g1_upper_body.py",
     allowed_collisions=among(
-        (
-            "left_one_link",
-            "left_three_link",
-            "left_four_link",
-            "left_five_link",
-            "left_six_link",
-            "left_palm_link",
-            "left_elbow_roll_link",
-        ),
-        (
-            "right_one_link",
-            "right_three_link",
-            "right_four_link",
-            "right_five_link",
-            "right_six_link",
-            "right_palm_link",
-            "right_elbow_roll_link",
-        ),
+        LEFT_NEIGHBOURS,
+        mirrored(LEFT_NEIGHBOURS),
         ("torso_link", "left_shoulder_roll_link", "right_shoulder_roll_link"),
     ),
 )

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.unitree_g1 import UNITREE_G1
-from robots.descriptor import ActionSplit, GripperMaterial, JointGroup
-from robots.parts import among, both_sides
+from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, Limb
+from robots.parts import among, both_sides, mirrored
 
 GROUPS = UNITREE_G1.action_split.groups
 LEFT_GRIPPER = JointGroup(
@@ -37,15 +37,7 @@ LEFT_GRIPPER = JointGroup(
 )
 RIGHT_GRIPPER = replace(
     LEFT_GRIPPER,
-    joints=(
-        "right_hand_thumb_0_joint",
-        "right_hand_thumb_1_joint",
-        "right_hand_thumb_2_joint",
-        "right_hand_middle_0_joint",
-        "right_hand_middle_1_joint",
-        "right_hand_index_0_joint",
-        "right_hand_index_1_joint",
-    ),
+    joints=mirrored(LEFT_GRIPPER.joints),
     limits=(
         (-1.0471976, 1.0471976),
         (-1.0471976, 0.61086524),
@@ -55,6 +47,21 @@ RIGHT_GRIPPER = replace(
         (-0.0, 1.5707964),
         (-0.0, 1.7453293),
     ),
+)
+LEFT_FINGERS = (
+    "left_hand_thumb_0_link",
+    "left_hand_thumb_1_link",
+    "left_hand_thumb_2_link",
+    "left_hand_middle_0_link",
+    "left_hand_middle_1_link",
+    "left_hand_index_0_link",
+    "left_hand_index_1_link",
+)
+LEFT_TIPS = ("left_hand_thumb_2_link", "left_hand_index_1_link")
+LEFT_LINKS = (
+    ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_thumb_0_link"),
+    ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_index_0_link"),
+    ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_middle_0_link"),
 )
 
 UNITREE_G1_WITH_HANDS = replace(
@@ -70,46 +77,20 @@ UNITREE_G1_WITH_HANDS = replace(
         legs=GROUPS["legs"],
     ),
     tcp_link="left_hand_palm_link",
-    tcp_position_links=("left_hand_thumb_2_link", "left_hand_index_1_link"),
+    tcp_position_links=LEFT_TIPS,
     gripper_material=GripperMaterial(
-        (
-            "left_hand_thumb_0_link",
-            "left_hand_thumb_1_link",
-            "left_hand_thumb_2_link",
-            "left_hand_middle_0_link",
-            "left_hand_middle_1_link",
-            "left_hand_index_0_link",
-            "left_hand_index_1_link",
-            "right_hand_thumb_0_link",
-            "right_hand_thumb_1_link",
-            "right_hand_thumb_2_link",
-            "right_hand_middle_0_link",
-            "right_hand_middle_1_link",
-            "right_hand_index_0_link",
-            "right_hand_index_1_link",
-        ),
-        2.0,
-        2.0,
-        0.0,
-        patch_radius=0.1,
+        (*LEFT_FINGERS, *mirrored(LEFT_FINGERS)), 2.0, 2.0, 0.0, patch_radius=0.1
     ),
     keyframes={"rest": (0,) * 43},
     limbs=both_sides(
-        "{side}_hand_palm_link",
-        0.529,
-        (0.0, 0.1002, 0.2918),
-        tcp_position_links=("{side}_hand_thumb_2_link", "{side}_hand_index_1_link"),
+        Limb("left_hand_palm_link", 0.529, (0.0, 0.1002, 0.2918), tcp_position_links=LEFT_TIPS)
     ),
     reach=0.629,  # of the left TCP, from the URDF
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
         ("left_shoulder_pitch_link", "head_link", "logo_link"),
         ("right_shoulder_pitch_link", "head_link", "logo_link"),
-        ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_thumb_0_link"),
-        ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_index_0_link"),
-        ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_middle_0_link"),
-        ("right_wrist_yaw_link", "right_hand_palm_link", "right_hand_thumb_0_link"),
-        ("right_wrist_yaw_link", "right_hand_palm_link", "right_hand_index_0_link"),
-        ("right_wrist_yaw_link", "right_hand_palm_link", "right_hand_middle_0_link"),
+        *LEFT_LINKS,
+        *mirrored(LEFT_LINKS),
         ("left_wrist_pitch_link", "left_hand_palm_link"),
         ("right_wrist_pitch_link", "right_hand_palm_link"),
         ("left_hip_pitch_link", "pelvis_contour_link"),

@@ -21,7 +21,7 @@ from robots.mjcf.couplings import Couplings
 from robots.mjcf.reading import Model, name_of
 from robots.mjcf.robot import SLIDE, MjcfRobot, take_name
 from robots.urdf.mesh_files import binary_stl
-from robots.urdf.writing import joint_element, origin_of, text
+from robots.urdf.text import joint_element, origin_of, text
 
 FARTHEST = 10.0  # m; how far a slide goes each way whose range nothing says
 TOOLS = (*words.TCP, *words.GRASP, *words.TOOL, *words.END, *words.HAND, *words.TIP, *words.FLANGE)

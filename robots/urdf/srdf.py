@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 from robot_layouts.core.errors import AssetError, UnknownNameError
 from robots.urdf.model import UrdfModel
-from robots.urdf.summary import root_of
+from robots.urdf.summary import root_of, srdf_beside
 from robots.urdf.text import numbers_of
 
 
@@ -25,18 +24,6 @@ class ExcludedPair:
 
     links: tuple[str, str]
     reason: str
-
-
-def srdf_beside(urdf: Path) -> Path | None:
-    """Return the SRDF of a URDF's name, or None if there is none.
-
-    It lies beside the URDF, or in a folder ``srdf`` beside the URDF's, as in ROS packages.
-    """
-    beside = urdf.with_suffix(".srdf")
-    for srdf in (beside, urdf.parent.parent / "srdf" / beside.name):
-        if os.path.lexists(srdf):
-            return srdf
-    return None
 
 
 @dataclass(frozen=True)

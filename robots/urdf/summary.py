@@ -1,7 +1,8 @@
-"""The text of a URDF as XML, and the files that it refers to."""
+"""The text of a URDF as XML, the files that it refers to, and one number that stands for them."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import posixpath
 from dataclasses import dataclass
@@ -11,9 +12,11 @@ from xml.etree import ElementTree
 
 from robot_layouts.core.errors import AssetError, UnreadableFileError
 from robot_layouts.core.files import read_regular
+from robots.descriptor import UrdfSource
 from robots.urdf.cleaning.cleaning import Cleaned, clean, is_template
 from robots.urdf.cleaning.references import find_package, package_of
 from robots.urdf.cleaning.xacro_files import XACRO, expand, template_of
+from robots.urdf.mesh_files import MAX_MESH_BYTES
 from robots.urdf.paths import Exists, is_allowed, resolve
 from robots.urdf.text import parse_xml
 
@@ -189,3 +192,66 @@ def parse_urdf(xml: bytes, urdf: str) -> ElementTree.Element:
     if any([f"{XACRO}}}" in element.tag for element in root.iter()]):  # quicker than one by one
         raise AssetError(f"{urdf} is a xacro template; only a file of its own is expanded")
     return root
+
+
+def srdf_beside(urdf: Path) -> Path | None:
+    """Return the SRDF of a URDF's name, or None if there is none.
+
+    It lies beside the URDF, or in a folder ``srdf`` beside the URDF's, as in ROS packages.
+    """
+    beside = urdf.with_suffix(".srdf")
+    for srdf in (beside, urdf.parent.parent / "srdf" / beside.name):
+        if os.path.lexists(srdf):
+            return srdf
+    return None
+
+
+def asset_fingerprint(source: UrdfSource) -> str:
+    """Return a SHA-256, in hex, over every file that physics reads.
+
+    These are the URDF, the SRDF beside it if there is one, and the collision meshes, each with
+    its path relative to the URDF; where on this machine they are makes no difference. Of a xacro
+    template it is what the template makes, and the paths in that.
+
+    Args:
+        source: Where the URDF comes from; files are fetched and checked as for a simulation.
+
+    Raises:
+        AssetError: If a file cannot be found or read.
+    """
+    lines = (f"{digest}  {name}\n" for name, digest in _checksums(source))
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+def asset_checksums(source: UrdfSource, *, pictures: bool = False) -> dict[str, str]:
+    """Return the SHA-256, in hex, of each of these files, by its path relative to the URDF.
+
+    Args:
+        source: Where the URDF comes from.
+        pictures: Whether to add the visual meshes that it names.
+
+    Raises:
+        AssetError: If a file cannot be found or read.
+    """
+    return dict(_checksums(source, pictures=pictures))
+
+
+def _checksums(source: UrdfSource, *, pictures: bool = False) -> list[tuple[str, str]]:
+    urdf = source.locate(pictures=pictures)
+    beside = _beside(urdf, pictures=pictures)
+    try:
+        contents = [(urdf, read_written(urdf))]
+        contents += ((path, read_regular(path, MAX_MESH_BYTES)) for path in beside)
+    except UnreadableFileError as error:
+        raise AssetError(str(error)) from error
+    return [
+        (Path(os.path.relpath(path, urdf.parent)).as_posix(), hashlib.sha256(data).hexdigest())
+        for path, data in contents
+    ]
+
+
+def _beside(urdf: Path, *, pictures: bool) -> list[Path]:
+    references = read_references(read_urdf(urdf), urdf.as_posix(), exists=os.path.isfile)
+    srdf = srdf_beside(urdf)
+    visual = references.visual if pictures else ()
+    return [*([srdf] if srdf else []), *map(Path, (*references.collision, *visual))]

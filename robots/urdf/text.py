@@ -1,16 +1,21 @@
-"""The text of a URDF: XML that may come from anyone, and the numbers and names in it."""
+"""The text of a URDF: XML that may come from anyone, its numbers and names, and parts to write."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, SubElement
 
 from robot_layouts.core.errors import AssetError
 from robot_layouts.core.quoting import shown
+from robot_layouts.kinematics.quaternions import quaternion_rpy
+from robots.parts import Quaternion, Vector3
+
+if TYPE_CHECKING:
+    from robot_layouts.kinematics.rotations import Floats
 
 MAX_DEPTH = 100  # elements inside one another; the deepest Collada meshes have about 20
 
@@ -129,3 +134,44 @@ def expect_numbers(element: Element, counts: Mapping[str, Mapping[str, int]], wh
         found = element.find(part)
         for attribute in attributes if found is not None else ():
             numbers_of(found, attribute, (0.0,) * attributes[attribute], where)
+
+
+def text(*numbers: float) -> str:
+    """Return numbers as a URDF has them, to the last digit."""
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def origin_at(position: Vector3, quaternion: Quaternion) -> dict[str, str]:
+    """Return the attributes of an ``<origin>``.
+
+    Args:
+        position: m.
+        quaternion: wxyz.
+    """
+    return {"xyz": text(*position), "rpy": text(*quaternion_rpy(quaternion))}
+
+
+def origin_of(pose: Floats) -> dict[str, str]:
+    """Return the attributes of the ``<origin>`` of a pose, (4, 4) (m)."""
+    from robot_layouts.kinematics.rotations import quaternion_of  # NumPy, for which others wait
+
+    x, y, z = pose[:3, 3].tolist()
+    a, b, c, d = quaternion_of(pose[:3, :3]).tolist()
+    return origin_at((x, y, z), (a, b, c, d))
+
+
+def joint_element(name: str, kind: str, parent: str, child: str, origin: dict[str, str]) -> Element:
+    """Return a joint.
+
+    Args:
+        name: Its name.
+        kind: Its type, such as ``"fixed"``.
+        parent: The link that carries it.
+        child: The link that it carries.
+        origin: Of that one in the frame of the other; see `origin_of`.
+    """
+    made = Element("joint", name=name, type=kind)
+    SubElement(made, "parent", link=parent)
+    SubElement(made, "child", link=child)
+    SubElement(made, "origin", origin)
+    return made

@@ -7,8 +7,8 @@ from dataclasses import MISSING, fields, is_dataclass
 from typing import Any
 
 from layouts.preview import layout_html
+from robot_layouts.core.pages import heading, table
 from robots import RobotDescriptor
-from robots.display import heading, table
 
 Task = Any  # a `TaskEnv`, whose module needs this one
 Scenario = Any  # likewise

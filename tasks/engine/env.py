@@ -46,9 +46,8 @@ from tasks.engine.observation import Observer, read_mode, space_of
 from tasks.engine.pictures import tiled
 from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
-from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario
+from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario, Touch, touch_links
 from tasks.engine.task import Info, Memory, Task
-from tasks.engine.touch import Touch, touch_links
 from tasks.language.randomness import EpisodeRandom, phrasings
 from tasks.language.stages import PassedStages
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict

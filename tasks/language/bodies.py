@@ -23,8 +23,7 @@ from objects.shapes import (
 from robot_layouts.core.schema import check_fields
 from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_table
-from robot_layouts.simulation.tabletop import TABLE_OUTLINE
-from robot_layouts.simulation.world import BodyKind
+from robot_layouts.simulation.world import TABLE_OUTLINE, BodyKind
 from robots import TaskError
 from robots.descriptor import IDENTITY, Quaternion
 from tasks.language.props import (

@@ -11,7 +11,7 @@ from tests.data.clusters import running_cluster
 @pytest.mark.long
 @pytest.mark.parametrize("portable", [False, True])
 def test_actors_are_as_portable_as_who_hires_them(portable):
-    before = [sys.executable, "-m", "robots.portable"] if portable else []
+    before = [sys.executable, "-m", "robot_layouts", "portable"] if portable else []
     with running_cluster() as nodes:
         nodes.grow(1)
         command = [*before, sys.executable, "-m", "tests.data.asking_process", nodes.address]

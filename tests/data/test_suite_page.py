@@ -8,8 +8,7 @@ import pytest
 from robot_layouts.__main__ import main
 from robot_layouts.data.receipts.receipt import EpisodeReceipt, Receipt
 from robot_layouts.data.receipts.verification import verify
-from robot_layouts.data.suite.clips import worst_seeds
-from robot_layouts.data.suite.page import PAGE, RUNS, TABLES, write_page
+from robot_layouts.data.suite.page import PAGE, RUNS, TABLES, worst_seeds, write_page
 from robot_layouts.data.suite.run import begin_run, read_run, receipt_path, run_suite
 from robot_layouts.data.suite.suite import Case, Suite
 from robot_layouts.data.video import video_problem

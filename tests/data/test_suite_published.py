@@ -57,7 +57,15 @@ def test_it_is_so_on_this_processor(path, tmp_path):
     receipt = Receipt.read(path)
     few = replace(receipt, episodes=receipt.episodes[:2], claimed="")
     few.write(tmp_path / "few.json")
-    portable = [sys.executable, "-m", "robots.portable", sys.executable, "-m", "robot_layouts"]
+    portable = [
+        sys.executable,
+        "-m",
+        "robot_layouts",
+        "portable",
+        sys.executable,
+        "-m",
+        "robot_layouts",
+    ]
     words = ["verify", "few.json", "--workers", "0"]
     done = subprocess.run(
         [*portable, *words], cwd=tmp_path, capture_output=True, text=True, check=False

@@ -15,7 +15,7 @@ from unittest import mock
 from huggingface_hub import constants
 
 from robots.assets import sources
-from robots.assets.packages import MANI_SKILL
+from robots.assets.manifest import MANI_SKILL
 from robots.assets.sources import HubSource, PackageWheel
 from robots.assets.store import AssetStore
 from tests.faults.fault import GOES_ON, REFUSED, Fault, sparse

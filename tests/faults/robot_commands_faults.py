@@ -11,12 +11,11 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
+from robot_layouts.__main__ import main as program
 from robots import RobotRegistry
 from robots.assets.store import AssetStore
 from robots.fetch_assets import main as fetch_assets
 from robots.fetch_assets import robot_files
-from robots.from_urdf import main as from_urdf
-from robots.inspect import main as inspect
 from tests.faults.fault import GOES_ON, Fault
 from tests.faults.tiny_files import run_main, settings
 from tests.robots.conftest import contents
@@ -38,12 +37,54 @@ WRONG_WORDS: dict[str, tuple[Callable[..., int], tuple[str, ...]]] = {
         ("koch", "--physics-only", "--source", "mani_skill", "--dest", "/dev/null"),
     ),
     "fetch_assets --source local of nothing": (fetch_assets, ("koch", "--source", "local")),
-    "inspect padna": (inspect, ("padna",)),
-    "inspect a path": (inspect, ("/etc/passwd",)),
-    "from_urdf of nothing there": (from_urdf, ("nothing/there.urdf",)),
-    "from_urdf of /etc/passwd": (from_urdf, ("/etc/passwd",)),
-    "from_urdf of a name of 5000 letters": (from_urdf, ("x" * 5000 + ".urdf",)),
-    "from_urdf of an unknown description": (from_urdf, ("pandaa_description",)),
+    "inspect padna": (
+        program,
+        (
+            "robots",
+            "inspect",
+            "padna",
+        ),
+    ),
+    "inspect a path": (
+        program,
+        (
+            "robots",
+            "inspect",
+            "/etc/passwd",
+        ),
+    ),
+    "from_urdf of nothing there": (
+        program,
+        (
+            "robots",
+            "guess",
+            "nothing/there.urdf",
+        ),
+    ),
+    "from_urdf of /etc/passwd": (
+        program,
+        (
+            "robots",
+            "guess",
+            "/etc/passwd",
+        ),
+    ),
+    "from_urdf of a name of 5000 letters": (
+        program,
+        (
+            "robots",
+            "guess",
+            "x" * 5000 + ".urdf",
+        ),
+    ),
+    "from_urdf of an unknown description": (
+        program,
+        (
+            "robots",
+            "guess",
+            "pandaa_description",
+        ),
+    ),
 }
 FETCH = (sys.executable, "-m", "robots.fetch_assets", "koch", "--physics-only")
 ODD_NAMES = {"no UTF-8": "caf\udce9", "an escape": "a\x1b[31mb", "a line break": "a\nb"}

@@ -5,7 +5,7 @@ import pytest
 
 from layouts import Layout, Placement
 from robot_layouts.motion.collision.cell import Cell
-from robot_layouts.motion.model.link_poses import LinkPoses
+from robot_layouts.motion.model.bodies import LinkPoses
 from tests.catalogue import every_robot
 from tests.motion import cells
 

@@ -7,14 +7,13 @@ import pytest
 import trimesh
 
 from objects import ObjectDescriptor, ObjectRegistry
-from objects.fetch import fetch
+from objects.inspect import fetch
 from objects.packaged import MEASURED, PACKAGED, PackagedObject, measurements
 from objects.registry import CATALOGUE
 from robot_layouts.__main__ import main
 from robot_layouts.simulation.checks.objects import try_rests, try_thing_grasps
 from robots import DescriptorError, UnknownNameError
-from robots.assets.manifest import load_manifest
-from robots.assets.packages import SourceError, find_package
+from robots.assets.manifest import SourceError, find_package, load_manifest
 
 SINGLE = [name for name, one in PACKAGED.items() if one.members == 1]
 PRESSED = {"metaworld_door_lock", "metaworld_window_sideways"}  # no grasp of them holds

@@ -11,8 +11,7 @@ import pytest
 
 from robot_layouts.core.paths import default_root
 from robots.assets import sources as asset_sources
-from robots.assets.manifest import AssetFile, load_manifest
-from robots.assets.packages import SourceError, find_package
+from robots.assets.manifest import AssetFile, SourceError, find_package, load_manifest
 from robots.assets.store import AssetStore, FileState
 from tests.robots.hub_server import HubServer
 

@@ -12,8 +12,7 @@ from robot_layouts.core import paths
 from robot_layouts.core.paths import default_root
 from robots import AssetError, RobotRegistry, UnknownNameError, UrdfLocator
 from robots.assets.fetching import ensure
-from robots.assets.manifest import load_manifest
-from robots.assets.packages import INDEX_PACKAGES, MANI_SKILL, SourceError
+from robots.assets.manifest import INDEX_PACKAGES, MANI_SKILL, SourceError, load_manifest
 from robots.assets.sources import InstalledPackage, LocalCopy
 from robots.assets.store import AssetStore, FileState
 from robots.urdf.summary import read_references

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from robot_layouts.__main__ import main
 from robots import AssetError, RobotRegistry
 from robots.from_urdf import guess_descriptor
-from robots.inspect import main as inspect_main
 from robots.registry import CATALOGUE, ROBOTS
 from robots.urdf.cleaning.cleaning import clean
 from robots.urdf.reading import read_model
@@ -99,7 +99,7 @@ def test_a_repair_shows_in_the_report_on_a_robot(tmp_path, capsys, monkeypatch):
     urdf = write_damaged(tmp_path, REPAIRS["no inertia"][0])
     descriptor = guess_descriptor(urdf, "cleaned_toy").descriptor
     monkeypatch.setattr(ROBOTS, "registered", {"cleaned_toy": descriptor})
-    assert inspect_main(["cleaned_toy"]) == 0
+    assert main(["robots", "inspect", "cleaned_toy"]) == 0
     assert f"Repaired in the URDF\n  {REPAIRS['no inertia'][1][0]}" in capsys.readouterr().out
 
 

@@ -14,7 +14,7 @@ from robots import AssetError, RobotLayoutsError, UnknownNameError
 REPOSITORY = Path(__file__).parents[2]
 BEGIN = "import os, sys; from robot_layouts.core.commands import exit_code, notice, start; "
 ROOMS = {
-    "robots": "robots.inspect panda --help",
+    "robots": "robots.fetch_assets --help",
     "layouts": "layouts --help",
     "tasks": "tasks --help",
     "robot_layouts": "robot_layouts record --help",

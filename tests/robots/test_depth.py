@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from robots.bodies.depth import overlap
+from robots.bodies.overlaps import overlap
 
 CUBE = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 

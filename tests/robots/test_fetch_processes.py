@@ -15,7 +15,7 @@ import pytest
 from robots import AssetError, UrdfLocator
 from robots.assets import sources
 from robots.assets.fetching import ensure
-from robots.assets.packages import MANI_SKILL
+from robots.assets.manifest import MANI_SKILL
 from robots.assets.sources import PackageWheel
 from robots.assets.store import FileState
 from tests.robots.conftest import contents
@@ -71,7 +71,7 @@ def test_a_process_killed_while_writing_leaves_no_half_file(store, physics, tmp_
     script.write_text(
         "import os, signal\n"
         "from robots import UrdfLocator\n"
-        "from robots.assets.packages import MANI_SKILL\n"
+        "from robots.assets.manifest import MANI_SKILL\n"
         "from robots.assets.sources import InstalledPackage\n"
         "import robots.assets.fetching\n"
         "robots.assets.fetching.default_sources = lambda: [InstalledPackage(MANI_SKILL)]\n"

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from robots import AssetError, LocalUrdf, RobotRegistry
-from robots.fingerprint import asset_fingerprint
+from robots.urdf.summary import asset_fingerprint
 from tests.catalogue import is_optional
 
 URDF = RobotRegistry.load("panda").urdf

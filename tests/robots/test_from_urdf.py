@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from robot_layouts.__main__ import main
 from robots import (
     AssetError,
     DescriptorError,
@@ -21,10 +22,9 @@ from robots import (
     UnknownNameError,
     UrdfLocator,
 )
-from robots.assets.manifest import load_manifest
-from robots.assets.packages import find_package
+from robots.assets.manifest import find_package, load_manifest
 from robots.data_module import write_module
-from robots.from_urdf import Guess, guess_descriptor, main
+from robots.from_urdf import Guess, guess_descriptor
 from robots.registry import CATALOGUE
 from robots.registry import ROBOTS as CATALOGUED
 from tests.robots.urdf_parts import Parts
@@ -227,15 +227,15 @@ def run(source: str, robot: str) -> RobotDescriptor:
 
 class TestCommand:
     def test_it_prints_reasons_or_the_module(self, capsys):
-        assert main([str(urdf_of("so100")), "--name", "tiny"]) == 0
+        assert main(["robots", "guess", str(urdf_of("so100")), "--name", "tiny"]) == 0
         assert capsys.readouterr().out.splitlines()[-1].endswith(" more reasons: --all")
-        assert main([str(urdf_of("so100")), "--name", "tiny", "--all"]) == 0
+        assert main(["robots", "guess", str(urdf_of("so100")), "--name", "tiny", "--all"]) == 0
         assert "gripper: one jaw, gripper, the last joint" in capsys.readouterr().out
-        assert main([str(urdf_of("so100")), "--name", "tiny", "--module"]) == 0
+        assert main(["robots", "guess", str(urdf_of("so100")), "--name", "tiny", "--module"]) == 0
         assert "TINY = RobotDescriptor(" in capsys.readouterr().out
 
     def test_what_cannot_be_read_is_an_error(self, capsys, tmp_path):
-        assert main([str(tmp_path / "no.urdf")]) == 1
+        assert main(["robots", "guess", str(tmp_path / "no.urdf")]) == 1
         assert "error: cannot read the URDF" in capsys.readouterr().err
 
 

@@ -13,7 +13,7 @@ from huggingface_hub import constants
 
 from robots import AssetError
 from robots.assets.fetching import ensure
-from robots.assets.packages import MANI_SKILL
+from robots.assets.manifest import MANI_SKILL
 from robots.assets.sources import HubSource, InstalledPackage
 from robots.assets.store import FileState
 from tests.robots.conftest import PANDA

@@ -78,7 +78,7 @@ print("opened", any("robots" in path for event, path in seen))
 def test_locating_loads_neither_the_hub_client_nor_the_simulator(tmp_path: Path):
     code = f"""
 import robots.assets.fetching
-from robots.assets.packages import MANI_SKILL
+from robots.assets.manifest import MANI_SKILL
 from robots.assets.sources import InstalledPackage
 robots.assets.fetching.default_sources = lambda: [InstalledPackage(MANI_SKILL)]
 robots.RobotRegistry.load("panda").urdf.locate()

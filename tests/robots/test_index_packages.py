@@ -13,8 +13,14 @@ import pytest
 from benchmarks.manifest import build_manifest, build_package
 from robots import AssetError
 from robots.assets.fetching import ensure
-from robots.assets.manifest import AssetFile, PackageOrigin, load_manifest
-from robots.assets.packages import EXAMPLE_ROBOT_DATA, MANI_SKILL, find_package
+from robots.assets.manifest import (
+    EXAMPLE_ROBOT_DATA,
+    MANI_SKILL,
+    AssetFile,
+    PackageOrigin,
+    find_package,
+    load_manifest,
+)
 from robots.assets.sources import InstalledPackage, PackageWheel
 from robots.fetch_assets import main
 from tests.robots.wheel_index import WheelIndex, without_pip_settings

@@ -1,4 +1,4 @@
-"""The command `python -m robots.inspect`."""
+"""The command `robot-layouts robots inspect`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from robot_layouts import __main__ as console
+from robot_layouts.__main__ import main
 from robot_layouts.core.paths import default_root
 from robots import RobotRegistry
 from robots.assets.store import AssetStore
-from robots.inspect import find_urdf, main, report
+from robots.inspect import find_urdf, report
 from tests.catalogue import every_robot
 
 ROBOTS = RobotRegistry.names()
@@ -49,7 +50,7 @@ def test_files_are_told_with_state_and_source(store, physics, fill):
 
 
 def test_without_any_copy_the_report_says_what_is_missing(store, monkeypatch):
-    from robots.assets.packages import SourceError
+    from robots.assets.manifest import SourceError
 
     def refuse(name: str) -> Path:
         raise SourceError(f"{name} is not installed")
@@ -62,7 +63,7 @@ def test_without_any_copy_the_report_says_what_is_missing(store, monkeypatch):
 
 
 def test_inspecting_fetches_nothing(store):
-    assert main(["panda"]) == 0
+    assert main(["robots", "inspect", "panda"]) == 0
     assert not store.root.exists()
 
 
@@ -73,5 +74,5 @@ def test_list_has_a_row_for_every_robot(capsys):
 
 
 def test_an_unknown_robot_is_one_line(capsys):
-    assert main(["padna"]) == 2
+    assert main(["robots", "inspect", "padna"]) == 2
     assert capsys.readouterr().err.startswith("error: unknown robot 'padna'. Did you mean 'panda'?")

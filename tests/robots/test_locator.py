@@ -9,9 +9,8 @@ import pytest
 import trimesh
 
 from robots import AssetError, UnknownNameError, UrdfLocator
-from robots.assets.locator import FileLocator, LocalUrdf
+from robots.assets.locator import GROUND_TEXTURE, SCENERY, TABLE, FileLocator, LocalUrdf
 from robots.assets.manifest import load_manifest
-from robots.assets.scenery import GROUND_TEXTURE, PACKAGE, TABLE
 from robots.bodies.hulls import read_hulls
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
@@ -119,14 +118,14 @@ def test_a_folder_of_a_packages_name_needs_its_package_xml(apart):
 
 
 def test_the_files_of_the_scenery_come_together(store, fill):
-    files = load_manifest().package(PACKAGE).files
+    files = load_manifest().package(SCENERY).files
     fill(store, files)
     for locator in (TABLE, GROUND_TEXTURE):
-        assert locator.locate() == store.root / PACKAGE / locator.file
+        assert locator.locate() == store.root / SCENERY / locator.file
     assert {file.path for file in files} == {TABLE.file, GROUND_TEXTURE.file}
     assert not any(file.physics for file in files)
 
 
 def test_a_file_that_is_not_in_the_manifest_is_named():
-    with pytest.raises(UnknownNameError, match=f"unknown file of {PACKAGE} 'table.glb'"):
-        FileLocator(PACKAGE, "table.glb").locate()
+    with pytest.raises(UnknownNameError, match=f"unknown file of {SCENERY} 'table.glb'"):
+        FileLocator(SCENERY, "table.glb").locate()

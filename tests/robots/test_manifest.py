@@ -15,8 +15,7 @@ from benchmarks.manifest import LARGEST_FILE, build_package, to_json
 from robot_layouts.core.paths import CHECKOUT_CACHE
 from robots import AssetError, UnknownNameError
 from robots.assets import manifest
-from robots.assets.manifest import AssetManifest, load_manifest
-from robots.assets.packages import find_package
+from robots.assets.manifest import AssetManifest, find_package, load_manifest
 
 
 @pytest.fixture

@@ -11,10 +11,11 @@ import trimesh
 
 from benchmarks.robots.probe import kinematic_difference
 from layouts import single
+from robot_layouts.__main__ import main
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.provenance import describe_guessed, guess_again
 from robots import AssetError, DescriptorError, LocalMjcf, MissingPackageError, RobotDescriptor
-from robots.from_urdf import guess_descriptor, main
+from robots.from_urdf import guess_descriptor
 from robots.mjcf import conversion
 from robots.named import named_robot
 from robots.urdf.reading import read_model
@@ -134,7 +135,7 @@ class TestWhatIsGuessed:
         path = write(own, mjcf(arm(inside='<geom type="mesh" mesh="box"/>'), assets))
         with pytest.raises(AssetError, match=r"leads out of .* folder=… \(--folder DIR\)"):
             guess_descriptor(path)
-        assert main([str(path), "--folder", str(far)]) == 0
+        assert main(["robots", "guess", str(path), "--folder", str(far)]) == 0
         robot = RobotDescriptor.from_mjcf(path, quiet=True, folder=far)
         assert robot.urdf == LocalMjcf(str(path), str(far))
 
@@ -322,7 +323,7 @@ class TestEverywhere:
         path = write(tmp_path, mjcf(arm(end='<site name="tcp"/>')))
         assert named_robot(str(path)).tcp_link == "tcp"
         assert single({"arm": str(path)})["arm"].robot.name == "small"
-        assert main([str(path), "--module"]) == 0
+        assert main(["robots", "guess", str(path), "--module"]) == 0
         scope: dict[str, object] = {}
         exec(capsys.readouterr().out, scope)
         assert scope["SMALL"] == RobotDescriptor.from_mjcf(path, quiet=True)

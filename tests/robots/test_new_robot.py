@@ -9,8 +9,8 @@ import sys
 import pytest
 
 from layouts.__main__ import main as layouts
+from robot_layouts.__main__ import main
 from robots.named import named_robot
-from robots.new_robot import main
 from robots.registry import ROBOTS, RobotRegistry
 from tests.robots.urdf_parts import Parts
 
@@ -29,7 +29,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_it_holds_a_path_relative_to_itself(folder, monkeypatch, capsys):
-    assert main(["robot.urdf", "--out", "robots/own", "--folder", ".."]) == 0
+    assert main(["new", "robot", "robot.urdf", "--out", "robots/own", "--folder", ".."]) == 0
     assert "made:MADE" in capsys.readouterr().err
     source = (folder / "robots" / "own" / "made.py").read_text()
     assert str(folder) not in source
@@ -44,7 +44,7 @@ def test_it_holds_a_path_relative_to_itself(folder, monkeypatch, capsys):
 
 
 def test_its_name_is_enough_on_a_command_line(folder, capsys):
-    assert main(["robot.urdf"]) == 0
+    assert main(["new", "robot", "robot.urdf"]) == 0
     words = "face_to_face left=panda right=made:MADE --spacing auto --save cell.yaml"
     assert layouts(["show", *words.split()]) == 0
     sys.modules.pop("made")
@@ -57,7 +57,7 @@ def test_its_name_is_enough_on_a_command_line(folder, capsys):
 def test_the_tests_that_it_writes_pass(folder):
     shutil.copytree(RobotRegistry.load("panda").urdf.locate().parent, folder / "panda")
     (urdf,) = (folder / "panda").glob("panda_v2.urdf")
-    assert main([str(urdf), "--name", "made", "--folder", str(folder)]) == 0
+    assert main(["new", "robot", str(urdf), "--name", "made", "--folder", str(folder)]) == 0
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_made.py"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout

@@ -8,13 +8,14 @@ import sys
 
 import pytest
 
+from robot_layouts.__main__ import main
 from robot_layouts.core import portable
 from robot_layouts.core.portable import is_portable, missing_variables, portable_variables
 from robots import SimulationError
-from robots.portable import main, numpy_versions
+from robots.portable import numpy_versions
 from tests.quick import quick_cases
 
-BEGIN = (sys.executable, "-m", "robots.portable")
+BEGIN = (sys.executable, "-m", "robot_layouts", "portable")
 OURS = (*portable.FIXED, portable.NUMPY, portable.GLIBC, portable.PORTABLE)
 
 
@@ -109,18 +110,18 @@ def test_other_tunables_of_the_c_library_stay():
 
 
 def test_without_a_program_it_prints_the_variables(capsys):
-    assert main([]) == 0
+    assert main(["portable"]) == 0
     printed = dict(line.split("=", 1) for line in capsys.readouterr().out.splitlines())
     assert printed == portable_variables(os.environ, numpy_versions())
 
 
 def test_a_program_that_is_none(capsys, tmp_path):
-    assert main(["pyhton", "mine.py"]) == 1
+    assert main(["portable", "pyhton", "mine.py"]) == 1
     assert "there is no program 'pyhton'" in capsys.readouterr().err
     broken = tmp_path / "broken"
     broken.write_bytes(b"\x7fELF")
     broken.chmod(0o755)
-    assert main([str(broken)]) == 1
+    assert main(["portable", str(broken)]) == 1
     assert "cannot be begun: " in capsys.readouterr().err
 
 

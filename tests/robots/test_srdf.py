@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from robot_layouts.__main__ import main
 from robots import AssetError, UnknownNameError
-from robots.from_urdf import guess_descriptor, main
+from robots.from_urdf import guess_descriptor
 
 from .urdf_parts import Parts
 
@@ -114,5 +115,5 @@ def test_what_is_refused(robot, tmp_path, text, error, message):
 
 def test_the_command_takes_one(robot, tmp_path, capsys):
     given = str(srdf(tmp_path, groups("a")))
-    assert main([str(robot), "--srdf", given, "--all"]) == 0
+    assert main(["robots", "guess", str(robot), "--srdf", given, "--all"]) == 0
     assert "TCP: the link a_spot, as given.srdf says" in capsys.readouterr().out

@@ -10,8 +10,7 @@ import pytest
 
 from robots import RobotRegistry
 from robots.assets.fetching import ensure
-from robots.assets.manifest import load_manifest
-from robots.assets.packages import MANI_SKILL
+from robots.assets.manifest import MANI_SKILL, load_manifest
 from robots.assets.sources import PackageWheel
 from robots.assets.store import AssetStore, FileState
 from robots.fetch_assets import robot_files
@@ -76,7 +75,7 @@ def test_processes_that_lack_different_files_download_once(index, store):
     code = """
 import sys
 from robots.assets import fetching
-from robots.assets.packages import MANI_SKILL
+from robots.assets.manifest import MANI_SKILL
 from robots.assets.sources import PackageWheel
 from robots.registry import RobotRegistry
 fetching.default_sources = lambda: [PackageWheel(MANI_SKILL)]

@@ -7,8 +7,7 @@ import pytest
 
 from layouts.export.files import replaced_folder
 from robot_layouts.core.errors import UnwritableFileError
-from robot_layouts.core.writing import write_whole, writing_errors, written_whole
-from robot_layouts.data.recording.disk import claim
+from robot_layouts.core.writing import claim, write_whole, writing_errors, written_whole
 from robots import RecordingError, TaskError
 
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from robot_layouts.__main__ import main
 from robots import AssetError, LocalUrdf, RobotDescriptor
-from robots.fingerprint import asset_fingerprint
-from robots.from_urdf import guess_descriptor, main
+from robots.from_urdf import guess_descriptor
 from robots.urdf.cleaning.xacro_files import template_of, with_arguments
-from robots.urdf.summary import read_cleaned
+from robots.urdf.summary import asset_fingerprint, read_cleaned
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -136,11 +136,11 @@ def test_the_guess_lists_the_arguments(template):
 
 def test_the_command_takes_arguments(template, capsys):
     with pytest.raises(SystemExit):
-        main([str(template), "--xacro", "prefix"])
+        main(["robots", "guess", str(template), "--xacro", "prefix"])
     assert "'prefix' is not KEY=VALUE, such as prefix=left_" in capsys.readouterr().err
     pytest.importorskip("xacro")
     words = ["--xacro", "prefix=left_", "--xacro", "limit=2", "--all"]
-    assert main([str(template), *words]) == 0
+    assert main(["robots", "guess", str(template), *words]) == 0
     assert "arm: left_shoulder, left_elbow" in capsys.readouterr().out
 
 
@@ -149,8 +149,8 @@ def test_without_the_package_the_message_says_what_to_install(template):
     code = """
 import sys
 sys.modules["xacro"] = None
-from robots.from_urdf import main
-sys.exit(main(sys.argv[1:]))
+from robot_layouts.__main__ import main
+sys.exit(main(["robots", "guess", *sys.argv[1:]]))
 """
     done = subprocess.run(
         [sys.executable, "-c", code, str(template)],

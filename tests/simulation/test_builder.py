@@ -16,8 +16,7 @@ from sapien.wrapper.urdf_loader import URDFLoader
 from robot_layouts.simulation.sapien3.blueprint import Blueprint, read_blueprint
 from robots import AssetError, RobotDescriptor, RobotRegistry
 from robots.urdf.paths import resolve
-from robots.urdf.srdf import srdf_beside
-from robots.urdf.summary import parse_urdf
+from robots.urdf.summary import parse_urdf, srdf_beside
 from tests.catalogue import every_robot
 from tests.faults.toy_robots import LIMIT, descriptor, link, robot, toy
 

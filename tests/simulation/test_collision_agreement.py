@@ -14,7 +14,7 @@ from layouts import Layout, Placement
 from layouts.validation.collisions import nearest, stand
 from robot_layouts.simulation.sapien3.world import BuiltWorld
 from robots import RobotDescriptor, RobotRegistry
-from robots.assets.packages import find_package
+from robots.assets.manifest import find_package
 from robots.bodies.allowed import allowed_pairs, rigid_pairs
 from robots.bodies.hulls import load_model
 from robots.urdf.reading import read_model

@@ -10,7 +10,7 @@ import pytest
 import sapien
 
 from layouts import Layout, Placement
-from robot_layouts.simulation.sapien3.collision_groups import (
+from robot_layouts.simulation.sapien3.blueprint import (
     BITS,
     FLOOR,
     NO_FLOOR_CONTACT,

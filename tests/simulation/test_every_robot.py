@@ -13,7 +13,7 @@ from robot_layouts.simulation import PhysicsSettings, Simulation
 from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import RobotRegistry
-from robots.assets.packages import find_package
+from robots.assets.manifest import find_package
 from robots.from_urdf import guess_descriptor
 from robots.registry import CATALOGUE
 from tests.catalogue import every_robot

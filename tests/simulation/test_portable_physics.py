@@ -89,7 +89,7 @@ def test_worlds_of_a_portable_process_divide_exactly():
         "from robot_layouts.simulation.sapien3.exact_division import divide_exactly as d\n"
         "tasks.make('PickCube-v1', obs_mode='none').close(); print(d.cache_info().misses)"
     )
-    for before, divided in (((), "0"), ((sys.executable, "-m", "robots.portable"), "1")):
+    for before, divided in (((), "0"), ((sys.executable, "-m", "robot_layouts", "portable"), "1")):
         done = subprocess.run(
             [*before, sys.executable, "-c", code], capture_output=True, text=True, check=True
         )

@@ -20,7 +20,7 @@ from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix
 from robots import LayoutError
 from robots.bodies.allowed import joined_pairs, rigid_groups, rigid_pairs
 from robots.urdf.model import LinkInertia, ModelJoint
-from robots.urdf.writing import joint_element, origin_of, text
+from robots.urdf.text import joint_element, origin_of, text
 
 if TYPE_CHECKING:
     from layouts.arrangement import Arrangement

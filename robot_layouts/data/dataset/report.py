@@ -38,7 +38,7 @@ from robot_layouts.data.reading.recorded_task import task_for
 from robot_layouts.data.reading.recording import all_files, first_file
 from robot_layouts.data.video import video_problem
 from robots import RecordingError
-from robots.assets.progress import size
+from robots.assets.store import size
 from tasks.cell_options import CellOptions
 
 WIDTH, HEIGHT = 320, 132  # of a chart

@@ -20,7 +20,7 @@ from robot_layouts.core.commands import UsageError
 from robot_layouts.core.importing import optional
 from robot_layouts.core.pages import plural
 from robot_layouts.core.progress import Progress as ProgressLine
-from robot_layouts.core.writing import PARTIAL, writing_errors, written_whole
+from robot_layouts.core.writing import PARTIAL, claim, writing_errors, written_whole
 from robot_layouts.data.export.columns import (
     ColumnReader,
     Columns,
@@ -46,7 +46,6 @@ from robot_layouts.data.point_clouds import Box, point_cloud
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.recorded_task import task_class, task_for
 from robot_layouts.data.reading.recording import Recording, Trajectory
-from robot_layouts.data.recording.disk import claim
 from robot_layouts.simulation.rendering import drawing_problem
 from robots import (
     RecordingError,

@@ -28,7 +28,7 @@ from robot_layouts.data.reading.json_files import (
 )
 from robot_layouts.data.reading.recording import Recording, all_files
 from robots import RobotRegistry, UnknownNameError, UnreadableFileError
-from robots.assets import scenery
+from robots.assets.locator import SCENERY
 from robots.assets.manifest import load_manifest
 from robots.control_modes import written_mode
 from tasks import list_tasks
@@ -199,7 +199,7 @@ def parts_of(data: Described) -> list[UsedFiles]:
     if data.task_id not in list_tasks():
         found.append(UsedFiles(f"things of the task {data.task_id}"))
     if data.pictures:
-        origin = load_manifest().package(scenery.PACKAGE).origin
+        origin = load_manifest().package(SCENERY).origin
         words = f"{origin.licence} ({origin.licence_note})"
         found.append(UsedFiles("table and floor", origin.licence, words))
     return found

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from robot_layouts.core.cli import Word
 from robot_layouts.data.export.described import Described, card, describe, licence_for
 from robot_layouts.data.reading.hub import HubError, reason, repository_and_revision
-from robots.assets.hub_client import ENDPOINT_VARIABLE
+from robots.assets.sources import ENDPOINT_VARIABLE
 
 if TYPE_CHECKING:
     from huggingface_hub import HfApi

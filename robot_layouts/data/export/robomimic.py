@@ -11,6 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from robot_layouts.core.writing import DiskFile
 from robot_layouts.data.export.columns import (
     POSE,
     ColumnReader,
@@ -21,7 +22,6 @@ from robot_layouts.data.export.columns import (
     Watch,
 )
 from robot_layouts.data.export.shots import PictureChannel
-from robot_layouts.data.recording.disk import DiskFile
 from robots.control_modes import plain_mode
 from tasks.engine.cameras import Size, expect_apart
 from tasks.engine.columns import ROBOMIMIC, picture_column, robomimic_columns

@@ -12,7 +12,7 @@ from pathlib import Path
 from robot_layouts.core.commands import notice
 from robot_layouts.data.reading.json_files import FILE
 from robots import RobotLayoutsError
-from robots.assets.hub_client import ENDPOINT_VARIABLE, silent_bar, why
+from robots.assets.sources import ENDPOINT_VARIABLE, silent_bar, why
 
 PREFIX = "hub:"
 CERTIFICATE = "certificate.json"

@@ -45,10 +45,9 @@ from robots import (
     UnreadableFileError,
 )
 from robots.control_modes import plain_mode
-from robots.fingerprint import asset_fingerprint
 from robots.mjcf.locator import is_mjcf
 from robots.urdf.cleaning.cleaning import is_template
-from robots.urdf.summary import MAX_URDF_BYTES
+from robots.urdf.summary import MAX_URDF_BYTES, asset_fingerprint
 from tasks import Scenario, TaskEnv
 from tasks.engine.cameras import CameraData, describe_cameras
 from tasks.native.format import observation_keys

@@ -43,7 +43,7 @@ from robot_layouts.experts.registry import Expert
 from robot_layouts.simulation import Camera, PhysicsSettings
 from robots import RobotLayoutsError, UnreadableFileError
 from robots.control_modes import plain_mode
-from robots.fingerprint import asset_checksums
+from robots.urdf.summary import asset_checksums
 from tasks import MultiRobotTask, Scenario
 from tasks.engine.cameras import plain
 from tasks.episode import Score

@@ -26,7 +26,7 @@ from typing_extensions import NotRequired, TypedDict
 
 from robot_layouts.core.files import parse_json, read_regular
 from robot_layouts.core.schema import AnyText, FieldError, Object, check, whole
-from robot_layouts.core.writing import PARTIAL, written_whole
+from robot_layouts.core.writing import PARTIAL, DiskFile, disk_errors, written_whole
 from robot_layouts.data.reading.hdf5 import MAX_BYTES, NOTHING, Hdf5File, damage_errors
 from robot_layouts.data.reading.json_files import MAX_SEED, OwnEpisode
 from robot_layouts.data.reading.provenance import (
@@ -37,7 +37,6 @@ from robot_layouts.data.reading.provenance import (
     in_order,
     read_described,
 )
-from robot_layouts.data.recording.disk import DiskFile, disk_errors
 from robots import RecordingError
 from tasks.arrays import leaves
 from tasks.episode import REBUILT, PlayedEpisode

@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from robot_layouts.core.files import open_regular, read_text
-from robot_layouts.core.writing import PARTIAL, write_whole
+from robot_layouts.core.writing import PARTIAL, claim, disk_errors, write_whole
 from robot_layouts.data.actors import Source, combined, source_of
 from robot_layouts.data.reading.hdf5 import Hdf5File, damage_errors
 from robot_layouts.data.reading.json_files import (
@@ -45,7 +45,6 @@ from robot_layouts.data.reading.provenance import (
     numbered,
     recorded_control_mode,
 )
-from robot_layouts.data.recording.disk import claim, disk_errors
 from robot_layouts.data.recording.episode_files import (
     JoinedEpisode,
     PartEncoder,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from robot_layouts.core.progress import Progress
     from robot_layouts.data.playing.scheduler import Event
     from robot_layouts.data.suite.checked import CheckedRun
-    from robot_layouts.data.suite.clips import WorstSeed
+    from robot_layouts.data.suite.page import WorstSeed
     from robot_layouts.data.suite.suite import Case
 
 SuiteName = Annotated[str, Word("SUITE")]
@@ -148,7 +148,7 @@ def _films(
     suites: Sequence[Sequence[CheckedRun]], count: int, line: Progress
 ) -> tuple[list[WorstSeed], str]:
     """Return films of the worst seeds of each suite, or why there are none."""
-    from robot_layouts.data.suite.clips import film_worst
+    from robot_layouts.data.suite.page import film_worst
     from robot_layouts.data.video import video_problem
 
     if not count:

@@ -11,7 +11,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
-from robot_layouts.core.writing import writing_errors
+from robot_layouts.core.writing import claim, writing_errors
 from robot_layouts.data.actors import EXPERT
 from robot_layouts.data.evaluation import evaluate
 from robot_layouts.data.playing.executor import Executor, choose_executor
@@ -25,7 +25,6 @@ from robot_layouts.data.receipts.provenance import (
 )
 from robot_layouts.data.receipts.receipt import Receipt, ReceiptError
 from robot_layouts.data.receipts.verification import Verification, verify
-from robot_layouts.data.recording.disk import claim
 from robot_layouts.data.suite.suite import OTHERS, Case, Suite, load_suite, naming, save_suite
 from robot_layouts.experts import find_expert
 from robots import TaskError, UnknownNameError

@@ -31,9 +31,9 @@ from robot_layouts.data.playing.executor import checked_seeds
 from robot_layouts.data.reading.json_files import spans_of
 from robot_layouts.data.reading.provenance import descriptor_digest
 from robots import LayoutError, RobotDescriptor, RobotLayoutsError, TaskError, UnknownNameError
-from robots.fingerprint import asset_fingerprint
 from robots.named import robot_in_file
 from robots.registry import ROBOTS
+from robots.urdf.summary import asset_fingerprint
 from tasks import MultiRobotTask
 from tasks.engine.places import built_layout
 from tasks.randomization.declaration import Randomization, read_data

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from robot_layouts.kinematics.rotations import Floats, transform
 from robot_layouts.motion.collision.spheres import BALLS, SphereCluster, clusters_of
-from robot_layouts.motion.model.bodies import WORLD, Bodies, CellSolid
-from robot_layouts.motion.model.link_poses import LinkPoses
+from robot_layouts.motion.model.bodies import WORLD, Bodies, CellSolid, LinkPoses
 from robots.bodies.hulls import Hull
 
 Indices = NDArray[np.intp]

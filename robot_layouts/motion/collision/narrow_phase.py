@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from robot_layouts.kinematics.rotations import Floats, transform
 from robot_layouts.motion.collision.broad_phase import CandidatePairs, Indices, seen_from
-from robot_layouts.motion.model.bodies import Bodies
-from robot_layouts.motion.model.link_poses import LinkPoses
-from robots.bodies.depth import overlap
+from robot_layouts.motion.model.bodies import Bodies, LinkPoses
+from robots.bodies.overlaps import overlap
 
 TOUCHING = 1e-5  # m; nearer bodies are asked whether they overlap, as everywhere else
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from layouts.description import decimal
-from layouts.preview import TABLE
+from layouts.preview import TABLE, decimal
 from layouts.validation.findings import length_text
 from robot_layouts.core.errors import MotionError
 from robot_layouts.core.figures import COLOURS, FAINT, INK, SUPPORTED, blank_figure

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from robot_layouts.kinematics.rotations import Floats
 from robot_layouts.motion.collision.cell import Cell
-from robot_layouts.motion.model.hermite import hermite, hermite_slopes
 from robot_layouts.motion.model.obstacles import Track
+from robot_layouts.motion.timed_motion import hermite, hermite_slopes
 from robot_layouts.motion.timing.velocities import STEP
 
 

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 from objects import ObjectDescriptor
-from objects.inspect import OBJECT, report
-from objects.named import named_object
+from objects.inspect import OBJECT, named_object, report
 from robot_layouts.core.cli import File, Seed, Word
 from robot_layouts.core.errors import DescriptorError
 from robot_layouts.simulation.checks.grasp import GraspTrial, try_grasps

@@ -29,8 +29,7 @@ from robot_layouts.kinematics.rotations import (
 from robot_layouts.simulation.checks.overlaps import stand
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
 from robot_layouts.simulation.simulation import Simulation
-from robot_layouts.simulation.tabletop import add_table
-from robot_layouts.simulation.world import World
+from robot_layouts.simulation.world import World, add_table
 from robots import (
     ActionSplit,
     Fingers,

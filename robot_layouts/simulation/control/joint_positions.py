@@ -186,3 +186,48 @@ def joint_speeds(descriptor: RobotDescriptor, model: UrdfModel) -> NDArray[np.fl
         least, usual, most = SPEEDS[joint.unit]
         speeds.append(min(max(joint.velocity or usual, least), most))
     return np.array(speeds, np.float32)
+
+
+class LedGroup:
+    """The drives of a joint group with leaders; see `Leaders`.
+
+    Attributes:
+        group: The group.
+        places: Where its joints stand among all that are driven.
+        multipliers: What each joint multiplies the group's value by.
+        offsets: What it adds to that then.
+        leads: Which of them are leaders.
+    """
+
+    def __init__(self, group: JointGroup, first: int) -> None:
+        """Take a group, and where its first joint stands among all that are driven."""
+        self.group = group
+        self.places = slice(first, first + len(group.joints))
+        self._leaders = Leaders(group)
+        self.multipliers, self.offsets = np.array(group.followers, float).T
+        self.leads = np.array([joint in group.leaders for joint in group.joints])
+
+    def targets(self, wanted: float, qpos: Floats, qvel: Floats) -> tuple[Floats, Floats]:
+        """Return targets of position and of velocity of the group's joints, each (joints,).
+
+        Args:
+            wanted: Target of position of its first joint, which tells that of all.
+            qpos: Positions of its joints.
+            qvel: Their velocities.
+        """
+        goal, leads = (wanted - self.offsets[0]) / self.multipliers[0], self._leaders.places
+        ahead, value, speed = self._leaders.moved(goal, qpos[leads], qvel[leads])
+        positions = self.multipliers * np.where(self.leads, ahead, value) + self.offsets
+        return positions, np.where(self.leads, 0.0, self.multipliers * speed)
+
+
+def linkages(layout: Layout) -> list[LedGroup]:
+    """Return the joint groups of a layout that have leaders."""
+    found: list[LedGroup] = []
+    first = 0
+    for placement in layout.values():
+        for group in placement.robot.action_split.groups.values():
+            if group.leaders:
+                found.append(LedGroup(group, first))
+            first += len(group.joints)
+    return found

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from layouts import Layout
 from robot_layouts.simulation.backend import (
     Built,
     EachWorld,
@@ -25,23 +26,21 @@ from robot_layouts.simulation.backend import (
     arms_of,
 )
 from robot_layouts.simulation.cameras import AnyCamera, View
+from robot_layouts.simulation.control.joint_positions import linkages
 from robot_layouts.simulation.maths import Flags, Floats
 from robot_layouts.simulation.mujoco import mujoco
-from robot_layouts.simulation.mujoco.contacts import (
+from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, substeps_of
+from robot_layouts.simulation.mujoco.pictures import Pictures
+from robot_layouts.simulation.mujoco.world import (
     ArmWatcher,
     ForceReader,
+    MujocoWorld,
+    extent_of,
     overlaps_in,
     presses_on_object,
 )
-from robot_layouts.simulation.mujoco.drives import JointDrives
-from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, substeps_of
-from robot_layouts.simulation.mujoco.pictures import Pictures
-from robot_layouts.simulation.mujoco.world import MujocoWorld, extent_of
 from robot_layouts.simulation.physics import PhysicsSettings
-from robot_layouts.simulation.solvers import (
-    TreeArm,
-    TreeFollower,
-)
+from robot_layouts.simulation.solvers import TreeArm, TreeFollower
 from robot_layouts.simulation.world import World, WorldBody
 
 # What does not fit is seen in the state, which is no number then; MuJoCo would write a file of it.
@@ -251,3 +250,39 @@ class Threads:
             self._pool, self._made_for = ThreadPoolExecutor(count), (os.getpid(), count)
         for _ in self._pool.map(lambda work: work(), works):
             pass
+
+
+class JointDrives:
+    """The targets of all joints, robots in layout order, joints in the descriptors'.
+
+    A drive pulls with stiffness · (target - position) + damping · (target - velocity), as far as
+    its limit lets it; what depends on the targets is its control.
+
+    Attributes:
+        positions: Targets of position, (N, dof) (rad, m).
+        velocities: Targets of velocity, (N, dof) (rad/s, m/s).
+    """
+
+    def __init__(self, worlds: Sequence[MujocoWorld], layout: Layout, index: Inventory) -> None:
+        """Hold all joints where the layout starts them."""
+        start = [qpos for placement in layout.values() for qpos in placement.start_qpos]
+        self.positions = np.tile(np.array(start), (len(worlds), 1))
+        self.velocities = np.zeros_like(self.positions)
+        self._worlds, self._joints = worlds, index.joints
+        self._linkages = linkages(layout)
+        if self._linkages:
+            for i, world in enumerate(worlds):
+                world.before_each = lambda i=i: self.pull(i)
+
+    def pull(self, env: int) -> None:
+        """Set what the drives of a world do in its next step."""
+        model, data = self._worlds[env].model, self._worlds[env].data
+        positions, velocities = self.positions[env], self.velocities[env]
+        if self._linkages:
+            positions, velocities = positions.copy(), velocities.copy()
+        for linkage in self._linkages:
+            at = linkage.places
+            qpos, qvel = data.qpos[self._joints.qpos[at]], data.qvel[self._joints.qvel[at]]
+            positions[at], velocities[at] = linkage.targets(positions[at][0], qpos, qvel)
+        springs, dampers = model.actuator_biasprm[:, 1], model.actuator_biasprm[:, 2]
+        data.ctrl[:] = -springs * positions - dampers * velocities

@@ -16,7 +16,7 @@ from torch import Tensor
 from layouts import Layout
 from robot_layouts.core.importing import optional
 from robot_layouts.simulation.backend import Pair
-from robot_layouts.simulation.mujoco.drives import LedGroup, linkages
+from robot_layouts.simulation.control.joint_positions import LedGroup, linkages
 from robot_layouts.simulation.mujoco.model import Inventory
 
 _WHAT = "simulator='mujoco_warp' needs MuJoCo Warp"

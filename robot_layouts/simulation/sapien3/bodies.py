@@ -14,8 +14,8 @@ from sapien.wrapper.articulation_builder import ArticulationBuilder
 
 from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
 from robot_layouts.simulation.maths import Floats
+from robot_layouts.simulation.sapien3.blueprint import FLOOR
 from robot_layouts.simulation.sapien3.builder import joint_frame
-from robot_layouts.simulation.sapien3.collision_groups import FLOOR
 from robot_layouts.simulation.world import WorldBody, part_name
 
 _STILL = np.zeros(3, np.float32)

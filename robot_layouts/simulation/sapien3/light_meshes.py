@@ -24,7 +24,7 @@ from robot_layouts.core.paths import default_root
 from robot_layouts.kinematics.rotations import Floats
 from robots import MissingPackageError
 from robots.assets.assembled import write_folder
-from robots.assets.progress import say
+from robots.assets.store import say
 from robots.urdf.mesh_files import MAX_MESH_BYTES
 
 DEVIATION = 0.5e-3  # m
