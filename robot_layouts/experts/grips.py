@@ -138,7 +138,7 @@ def grip_of(
         place = cube[:3, 3], quaternion_of(cube[:3, :3])
         if not closing.has_room(qpos, place):
             continue
-        closed = closing.close(qpos, place, firmness)
-        if closed.held and closed.slipped < SLIPS * side if shaken else closed.grasped:
+        closed = closing.close(qpos, place, firmness, shaken)
+        if closed.held and closed.slipped < SLIPS * side:
             return Grip(pose, share, closed.share, firmness, closed.pose, side)
     return None

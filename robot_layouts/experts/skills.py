@@ -19,7 +19,7 @@ from robot_layouts.experts.geometry import turn
 from robot_layouts.experts.grips import swings
 from robot_layouts.experts.hands import Hand
 from robot_layouts.experts.holds import SPLAYED, Hold, Holds, holds_of
-from robot_layouts.experts.player import StuckError
+from robot_layouts.experts.player import BlockedError, StuckError
 from robot_layouts.experts.room import NOTHING
 from robot_layouts.experts.routes import Way, routes
 from robot_layouts.experts.script import Pose, Scene, Share, Waypoint
@@ -51,6 +51,7 @@ QUARTERS = (0.0, pi / 2, -pi / 2, pi)  # rad; ways in which what is square goes 
 GENTLY = 0.25  # of its speed, with what quick fingers hold, since each step of an arm shakes it
 SHUT = 0.005  # share of its opening from which on a gripper closes no further
 BACK = 0.05  # m; before a place, whence a thing or a gripper comes to it
+PITCHED = (0.0,), (pi / 6, -pi / 6), (pi / 3, -pi / 3)  # rad; of a hand otherwise out of reach
 DRAWN = (0.0, 0.005, 0.01)  # m; by which fingers take a thing nearer to their tips
 MOVES = 5  # poses on the way of a joint that are checked
 LEG, INWARD = 0.03, 0.003  # m; between waypoints of what goes straight, and into a hole
@@ -154,12 +155,18 @@ def grasp(
         return [] if goals is None else [[pose] for pose in goals(scene)]
 
     def choose(scene: Scene) -> tuple[Hold, Floats]:
-        steep = [hold for hold in holds.each if _leaning(hold.at(scene)) <= lean + 1e-6]
-        if not steep:
-            raise StuckError(
-                f"{robot!r} would lean more than {lean:.2g} rad in all grasps of {body}"
-            )
-        return taken(task, hand, scene, holds, steep, back=back, up=up, then=then)[0]
+        reason: StuckError | None = None
+        for angles in PITCHED:
+            offered = [hold.pitched(angle) for angle in angles for hold in holds.each]
+            steep = [hold for hold in offered if _leaning(hold.at(scene)) <= lean + 1e-6]
+            try:
+                if steep:
+                    return taken(task, hand, scene, holds, steep, back=back, up=up, then=then)[0]
+            except StuckError as error:
+                reason = reason or error
+        raise reason or StuckError(
+            f"{robot!r} would lean more than {lean:.2g} rad in all grasps of {body}"
+        )
 
     return taking(hand, body, holds, choose, back, after)
 
@@ -254,7 +261,10 @@ def taking(
         return near(scene, hold.shut, hold.at(scene))
 
     def near(scene: Scene, frame: Floats, pose: Floats) -> list[Floats]:
-        return nearest_posture(hand, frame, pose, hand.like(scene, chosen[0][1]))
+        found = nearest_posture(hand, frame, pose, hand.like(scene, chosen[0][1]))
+        if not found:  # there was a posture when the grasp was chosen
+            raise BlockedError(f"{hand.arm!r} has pushed {body} away")
+        return found
 
     def share(scene: Scene) -> float:
         return chosen[0][0].share

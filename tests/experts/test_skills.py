@@ -124,6 +124,21 @@ def test_jaws_that_swing_close_on_a_thin_wall_without_pushing_it_away():
     played(env, {"arm": (*grasp(env, "arm", "box", box), *lift(env, "arm", "box", 0.04))})
 
 
+class Leaning(MultiRobotTask):
+    layout = Walled.layout
+    max_episode_steps = 100
+    jug = Object("jug", spawn=Area(x=-0.1, y=0.012, yaw=0.36))
+
+    def evaluate(self, state):
+        """Success: the arm holds it."""
+        return {"success": state.is_grasping("arm", "jug")}
+
+
+def test_a_hand_leans_where_the_arm_cannot_draw_it_back_from_a_grasp_else():
+    env, jug = made(Leaning), load("jug")
+    played(env, {"arm": grasp(env, "arm", "jug", jug, up=0.045)})
+
+
 class Far(OneArm):
     mug = Object("mug", spawn=Area(x=0.3, y=0.5))
 

@@ -264,13 +264,16 @@ class Closing:
         away = self._alone.simulation.read().position(CUBE)[0].astype(float) - place[0]
         return float(np.linalg.norm(away)) < _ROOM * self._side
 
-    def close(self, open_: Floats, place: tuple[Floats, Floats], firmness: float = 1.0) -> Closed:
+    def close(
+        self, open_: Floats, place: tuple[Floats, Floats], firmness: float = 1.0, shake: bool = True
+    ) -> Closed:
         """Close on the cube, hold it, and shake it with the arm's first joint.
 
         Args:
             open_: All joints of the robot at first, (dof,) (rad, m).
             place: Where the cube floats then: its place, (3,) (m), and orientation, wxyz.
             firmness: Factor on the force with which it is held.
+            shake: Whether it is held and shaken at all; if not, what it grasps it is to hold.
         """
         self._begin(open_, place)
         alone, target = self._alone, open_.copy()
@@ -279,6 +282,8 @@ class Closing:
             alone.step(alone.numbers_for(target))
         grasped, first, share = self._grasps(), self._in_hand(), self._share()
         pose = self._in_link()
+        if not shake:
+            return Closed(grasped, grasped, 0.0, share, pose)
         slipped, grasps = 0.0, list[bool]()
         arm = [joint for joint in self._part.joints if joint in self._part.arm_joints][:1]
         for step in range(_HOLDING + _SHAKING):
