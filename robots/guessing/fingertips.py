@@ -156,18 +156,22 @@ class Fingertips:
     def opening(self, ends: Sequence[str], postures: Sequence[Mapping[str, float]]) -> Floats:
         """Return which way two fingers open, in the frames of the links that touch, (2, 3).
 
-        That is how their tips part from the last of some postures to the first; where they stay as
-        far apart, it is the line from tip to tip. The frames are those of the posture half-way.
+        That is how their tips part at first, from that of some postures in which they are nearest
+        to the one before: a jaw that swings wide open goes back. Where they stay as far apart, it
+        is the line from tip to tip, in the posture half-way.
         """
         places = [self.ends.index(end) for end in ends]
         poses = self.stance.poses(np.array([self.stance.with_joints(p) for p in postures]))
         one, other = np.array([self._places(at)[places] for at in poses]).transpose(1, 0, 2)
-        gaps, half = one - other, len(postures) // 2
-        way = gaps[0] - gaps[-1]
-        way = gaps[half] if np.linalg.norm(way) < STILL else way
+        gaps = one - other
+        at = max(int(np.linalg.norm(gaps, axis=1).argmin()), 1)
+        way = gaps[at - 1] - gaps[at]
+        if np.linalg.norm(way) < STILL:
+            at = len(postures) // 2
+            way = gaps[at]
         way /= max(float(np.linalg.norm(way)), 1e-9)
         links = [self.stance.tree.link(self.touching(end)) for end in ends]
-        return (np.array([way, -way])[:, None] @ poses[half][links][:, :3, :3])[:, 0]
+        return (np.array([way, -way])[:, None] @ poses[at][links][:, :3, :3])[:, 0]
 
     def finger_of(self, link: str) -> ModelJoint:
         """Return the joint with which the finger of a link begins at the hand."""
