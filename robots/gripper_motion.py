@@ -75,8 +75,7 @@ class GripperMotion:
                 f"the gripper of {robot.name} has no two ends between which it moves: its joints"
                 f" {', '.join(self.joints)} have no limits, or stay where they are"
             )
-        stiffness = [np.broadcast_to(group.stiffness, len(group.joints)) for group in groups]
-        self._work = float(np.concatenate(stiffness) @ self._travels**2)
+        self._work = float(np.concatenate(list(map(_pressing, groups))) @ self._travels**2)
         rows = np.tile(home_of(robot, tree), (len(SHARES), 1))
         rows[:, places] = self._positions(SHARES)
         poses = tree.forward(rows)
@@ -154,6 +153,15 @@ class GripperMotion:
 
     def _positions(self, shares: Floats) -> Floats:
         return np.asarray(self._ends[:, 0] + shares[:, None] * self._travels)
+
+
+def _pressing(group: JointGroup) -> Floats:
+    """Return the stiffness with which each joint of a gripper presses (N·m/rad, N/m).
+
+    Of a linkage only the leaders do: the others go where these are.
+    """
+    stiffness = np.broadcast_to(np.array(group.stiffness, float), len(group.joints))
+    return stiffness * [not group.leaders or joint in group.leaders for joint in group.joints]
 
 
 def _shapes(robot: RobotDescriptor, closed: Floats) -> list[Floats]:

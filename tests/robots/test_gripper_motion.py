@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robots import DescriptorError, RobotDescriptor, RobotRegistry
+from robots import ActionSplit, DescriptorError, RobotDescriptor, RobotRegistry
 from robots.gripper_motion import SHARES, aiming_joints, gripper_motion
 
 
@@ -105,3 +105,12 @@ def test_a_head_and_the_torso_that_carries_it_do_not_aim_an_arm(
     robot = RobotRegistry.load(name)
     arm = robot.parts[limb] if limb else robot
     assert set(arm.arm_joints) - set(aiming_joints(robot, arm)) == set(others)
+
+
+def test_of_a_linkage_only_its_leaders_press():
+    panda = load("panda")
+    groups = panda.action_split.groups
+    led = replace(groups["gripper"], leaders=("panda_finger_joint1",), lead=0.01)
+    robot = replace(panda, action_split=ActionSplit(**{**groups, "gripper": led}))
+    whole, half = gripper_motion(panda), gripper_motion(robot)
+    assert half.force(1e-4, 0.5) == pytest.approx(whole.force(1e-4, 0.5) / 2)
