@@ -121,7 +121,7 @@ class GripperMotion:
 
     def slope(self, share: float) -> float:
         """Return how much wider the gripper opens per share there (m)."""
-        low, high = np.clip((share - 0.05, share + 0.05), 0.0, 1.0)
+        low, high = np.clip((share - 0.05, share + 0.05), (0.0, SHARES[1]), (SHARES[-2], 1.0))
         wide = np.interp((low, high), SHARES, self.openings)
         return float((wide[1] - wide[0]) / (high - low))
 

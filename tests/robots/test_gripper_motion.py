@@ -67,6 +67,7 @@ def test_force_and_step_are_inverse(name: str):
     motion = gripper_motion(load(name))
     force = motion.force(1e-4, 0.5)
     assert motion.pressing(force, 0.5) * motion.slope(0.5) == pytest.approx(1e-4)
+    assert motion.slope(1.2) == pytest.approx(motion.slope(1.04))  # forced beyond its end
 
 
 def test_a_gripper_that_stays_where_it_is_has_no_two_ends():
