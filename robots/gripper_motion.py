@@ -28,7 +28,7 @@ _POSTURES = 9  # of the gripper between its limits, of which the most closed and
 SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
 _LEAST_WORK = 1e-9  # J; of drives that have no stiffness
 _SLIDES = 1e-6  # rad; fingers that turn less against each other slide
-_TOUCH = 2e-3  # m; jaws that are less deep in each other when closed touch
+_TOUCH = 2e-3  # m; jaws that are less deep in each other when closed, or less far apart, touch
 _AJAR = 8  # number of the share at which the pads' way is seen
 
 
@@ -36,9 +36,9 @@ class GripperMotion:
     """Where the fingers of a robot or a limb are as its gripper opens.
 
     Each finger's pad is where the TCP lies when the gripper is closed: there fingers meet, but for
-    jaws that slide and whose shapes are then inside each other: those meet before. How
-    far a gripper is open is given as a share, 0 where the action number -1 drives it, or closes
-    it as far as its joints go, and 1 where the number 1 does.
+    jaws that slide and whose shapes are then inside each other, or apart: those meet before, or
+    never. How far a gripper is open is given as a share, 0 where the action number -1 drives it,
+    or closes it as far as its joints go, and 1 where the number 1 does.
 
     Attributes:
         joints: Names of the gripper's joints.
@@ -181,7 +181,9 @@ def _shapes(robot: RobotDescriptor, closed: Floats) -> list[Floats]:
 
 
 def _inside(shapes: Sequence[Floats], apart: Floats) -> float:
-    """Return how far the shapes of two jaws are inside each other when closed, if they are (m).
+    """Return how far the shapes of two jaws are inside each other when closed (m).
+
+    That is below 0 of jaws that are apart then, and 0 of those that about touch.
 
     Args:
         shapes: Their corners, for each jaw (m).
@@ -191,7 +193,7 @@ def _inside(shapes: Sequence[Floats], apart: Floats) -> float:
         return 0.0
     one, other = (corners @ _unit(apart[-1]) for corners in shapes)
     deep = float(other.max() - one.min())
-    return deep if _TOUCH < deep < np.linalg.norm(apart[-1]) else 0.0
+    return deep if _TOUCH < abs(deep) < np.linalg.norm(apart[-1]) else 0.0
 
 
 def _turned(rotations: Floats) -> Floats:

@@ -61,7 +61,7 @@ def shape(inside: str, kind: str = "collision") -> str:
 
 
 SEEN = SHAPE.replace("collision", "visual")
-ENDS = "link {!r}, at the end of what collides, has no collision: it collides as it looks"
+ENDS = "link {!r} ends what collides, and has no collision: it collides as it looks"
 OF_BOX = "took that of a box of 2 kg and the size of its shapes, 0.1 × 0.2 × 0.3 m"
 OF_BALL = "took that of a ball of 2 kg and 1000 kg/m³, as it has no shape"
 

@@ -115,3 +115,11 @@ def test_of_a_linkage_only_its_leaders_press():
     robot = replace(panda, action_split=ActionSplit(**{**groups, "gripper": led}))
     whole, half = gripper_motion(panda), gripper_motion(robot)
     assert half.force(1e-4, 0.5) == pytest.approx(whole.force(1e-4, 0.5) / 2)
+
+
+def test_jaws_that_stay_apart_when_closed_are_open_by_so_much():
+    panda = load("panda")
+    groups = panda.action_split.groups
+    ajar = replace(groups["gripper"], lower=0.006, upper=0.04)
+    motion = gripper_motion(replace(panda, action_split=ActionSplit(**{**groups, "gripper": ajar})))
+    assert motion.openings[[0, -1]] == pytest.approx((0.012, 0.08), abs=1e-4)

@@ -77,17 +77,13 @@ def fill_ends(root: Element, urdf: str) -> Iterator[str]:
         if last and end not in solid and carriers.get(bare[-1]) in solid:
             found |= {*bare}
     for name, link in links.items():
-        if first[name] in found:
-            where = f"{urdf}, link {name!r}"
-            seen = [v for v in link.findall("visual") if _is_solid(v, where, urdf)]
-            for visual in seen:
-                collision = SubElement(link, "collision")
-                collision.extend(deepcopy(p) for p in visual if p.tag in ("origin", "geometry"))
-            if seen:
-                yield (
-                    f"link {name!r}, at the end of what collides, has no collision: it collides as"
-                    " it looks"
-                )
+        drawn = link.findall("visual") if first[name] in found else []
+        shapes = [shape for shape in drawn if _is_solid(shape, f"{urdf}, link {name!r}", urdf)]
+        for shape in shapes:
+            parts = (part for part in shape if part.tag in ("origin", "geometry"))
+            SubElement(link, "collision").extend(map(deepcopy, parts))
+        if shapes:
+            yield f"link {name!r} ends what collides, and has no collision: it collides as it looks"
 
 
 def _first_rigid(root: Element) -> dict[str, str]:
