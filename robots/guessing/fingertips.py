@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -76,10 +76,11 @@ class Fingertips:
         means = [np.mean([self._tips[link] for link in group], axis=0) for group in groups]
         return np.mean(means, axis=0)
 
-    def apart(self, positions: Mapping[str, float]) -> float:
-        """Return how far the tips are from their middle (m), with some joints elsewhere."""
+    def apart(self, positions: Mapping[str, float], ends: Iterable[str] = ()) -> float:
+        """Return how far tips, or some, are from the middle of all (m), with joints elsewhere."""
         places = self._places(self.stance.poses(self.stance.with_joints(positions))[0])
-        return float(np.linalg.norm(places - places.mean(axis=0), axis=1).mean())
+        which = [self.ends.index(end) for end in ends] or slice(None)
+        return float(np.linalg.norm(places - places.mean(axis=0), axis=1)[which].mean())
 
     def _places(self, poses: Floats) -> Floats:
         """Return the tips where the links have some poses, (ends, 3) (m)."""
