@@ -28,7 +28,7 @@ _POSTURES = 9  # of the gripper between its limits, of which the most closed and
 SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
 _LEAST_WORK = 1e-9  # J; of drives that have no stiffness
 _SLIDES = 1e-6  # rad; fingers that turn less against each other slide
-_TOUCH = 2e-3  # m; jaws that are less deep in each other when closed touch
+_TOUCH = 2e-3  # m; jaws that are less deep in each other when closed, or less far apart, touch
 _AJAR = 8  # number of the share at which the pads' way is seen
 
 
@@ -36,9 +36,9 @@ class GripperMotion:
     """Where the fingers of a robot or a limb are as its gripper opens.
 
     Each finger's pad is where the TCP lies when the gripper is closed: there fingers meet, but for
-    jaws that slide and whose shapes are then inside each other: those meet before. How
-    far a gripper is open is given as a share, 0 where the action number -1 drives it, or closes
-    it as far as its joints go, and 1 where the number 1 does.
+    jaws that slide and whose shapes are then inside each other, or apart: those meet before, or
+    never. How far a gripper is open is given as a share, 0 where the action number -1 drives it,
+    or closes it as far as its joints go, and 1 where the number 1 does.
 
     Attributes:
         joints: Names of the gripper's joints.
@@ -75,8 +75,7 @@ class GripperMotion:
                 f"the gripper of {robot.name} has no two ends between which it moves: its joints"
                 f" {', '.join(self.joints)} have no limits, or stay where they are"
             )
-        stiffness = [np.broadcast_to(group.stiffness, len(group.joints)) for group in groups]
-        self._work = float(np.concatenate(stiffness) @ self._travels**2)
+        self._work = float(np.concatenate(list(map(_pressing, groups))) @ self._travels**2)
         rows = np.tile(home_of(robot, tree), (len(SHARES), 1))
         rows[:, places] = self._positions(SHARES)
         poses = tree.forward(rows)
@@ -122,7 +121,7 @@ class GripperMotion:
 
     def slope(self, share: float) -> float:
         """Return how much wider the gripper opens per share there (m)."""
-        low, high = np.clip((share - 0.05, share + 0.05), 0.0, 1.0)
+        low, high = np.clip((share - 0.05, share + 0.05), (0.0, SHARES[1]), (SHARES[-2], 1.0))
         wide = np.interp((low, high), SHARES, self.openings)
         return float((wide[1] - wide[0]) / (high - low))
 
@@ -156,6 +155,15 @@ class GripperMotion:
         return np.asarray(self._ends[:, 0] + shares[:, None] * self._travels)
 
 
+def _pressing(group: JointGroup) -> Floats:
+    """Return the stiffness with which each joint of a gripper presses (N·m/rad, N/m).
+
+    Of a linkage only the leaders do: the others go where these are.
+    """
+    stiffness = np.broadcast_to(np.array(group.stiffness, float), len(group.joints))
+    return stiffness * [not group.leaders or joint in group.leaders for joint in group.joints]
+
+
 def _shapes(robot: RobotDescriptor, closed: Floats) -> list[Floats]:
     """Return the corners of the shapes of each finger that has any, (n, 3) (m).
 
@@ -173,7 +181,9 @@ def _shapes(robot: RobotDescriptor, closed: Floats) -> list[Floats]:
 
 
 def _inside(shapes: Sequence[Floats], apart: Floats) -> float:
-    """Return how far the shapes of two jaws are inside each other when closed, if they are (m).
+    """Return how far the shapes of two jaws are inside each other when closed (m).
+
+    That is below 0 of jaws that are apart then, and 0 of those that about touch.
 
     Args:
         shapes: Their corners, for each jaw (m).
@@ -183,7 +193,7 @@ def _inside(shapes: Sequence[Floats], apart: Floats) -> float:
         return 0.0
     one, other = (corners @ _unit(apart[-1]) for corners in shapes)
     deep = float(other.max() - one.min())
-    return deep if _TOUCH < deep < np.linalg.norm(apart[-1]) else 0.0
+    return deep if _TOUCH < abs(deep) < np.linalg.norm(apart[-1]) else 0.0
 
 
 def _turned(rotations: Floats) -> Floats:

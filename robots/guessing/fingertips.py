@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -76,10 +76,11 @@ class Fingertips:
         means = [np.mean([self._tips[link] for link in group], axis=0) for group in groups]
         return np.mean(means, axis=0)
 
-    def apart(self, positions: Mapping[str, float]) -> float:
-        """Return how far the tips are from their middle (m), with some joints elsewhere."""
+    def apart(self, positions: Mapping[str, float], ends: Iterable[str] = ()) -> float:
+        """Return how far tips, or some, are from the middle of all (m), with joints elsewhere."""
         places = self._places(self.stance.poses(self.stance.with_joints(positions))[0])
-        return float(np.linalg.norm(places - places.mean(axis=0), axis=1).mean())
+        which = [self.ends.index(end) for end in ends] or slice(None)
+        return float(np.linalg.norm(places - places.mean(axis=0), axis=1)[which].mean())
 
     def _places(self, poses: Floats) -> Floats:
         """Return the tips where the links have some poses, (ends, 3) (m)."""
@@ -156,18 +157,22 @@ class Fingertips:
     def opening(self, ends: Sequence[str], postures: Sequence[Mapping[str, float]]) -> Floats:
         """Return which way two fingers open, in the frames of the links that touch, (2, 3).
 
-        That is how their tips part from the last of some postures to the first; where they stay as
-        far apart, it is the line from tip to tip. The frames are those of the posture half-way.
+        That is how their tips part at first, from that of some postures in which they are nearest
+        to the one before: a jaw that swings wide open goes back. Where they stay as far apart, it
+        is the line from tip to tip, in the posture half-way.
         """
         places = [self.ends.index(end) for end in ends]
         poses = self.stance.poses(np.array([self.stance.with_joints(p) for p in postures]))
         one, other = np.array([self._places(at)[places] for at in poses]).transpose(1, 0, 2)
-        gaps, half = one - other, len(postures) // 2
-        way = gaps[0] - gaps[-1]
-        way = gaps[half] if np.linalg.norm(way) < STILL else way
+        gaps = one - other
+        at = max(int(np.linalg.norm(gaps, axis=1).argmin()), 1)
+        way = gaps[at - 1] - gaps[at]
+        if np.linalg.norm(way) < STILL:
+            at = len(postures) // 2
+            way = gaps[at]
         way /= max(float(np.linalg.norm(way)), 1e-9)
         links = [self.stance.tree.link(self.touching(end)) for end in ends]
-        return (np.array([way, -way])[:, None] @ poses[half][links][:, :3, :3])[:, 0]
+        return (np.array([way, -way])[:, None] @ poses[at][links][:, :3, :3])[:, 0]
 
     def finger_of(self, link: str) -> ModelJoint:
         """Return the joint with which the finger of a link begins at the hand."""

@@ -9,7 +9,7 @@ the inertia of its motor are the linkage's, whichever joint the motor turns.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -124,7 +124,7 @@ def _driven(
     else:
         reasons = []
     if len(leaders) > 1:
-        return _many(name, leaders, followers, drives)
+        return _many(name, leaders, followers, tips, drives)
     group, postures, about = _one(name, leaders[0], followers[leaders[0].name], tips, drives)
     mimics = [f"{j.name} follows {j.mimics}" for j in limb.fingers if j.mimics]
     if mimics:
@@ -273,18 +273,14 @@ def _one(
             MimicJoint(f.joint, -f.multiplier, f.multiplier * high + f.offset) for f in followers
         ]
         followers, low, high = flipped, 0.0, high - low
-    joints = [f.joint for f in followers]
     mimic = len(followers) > 1 or opens_down
-    linkage = find_linkage(followers, (low, high), tips, drives)
-    made = linkage.drives if linkage else [drives.gripping(joint) for joint in joints]
-    ahead = {"leaders": linkage.leaders, "lead": linkage.lead} if linkage else {}
     lower = _tidy(low - SQUEEZE if leader.unit == "m" else low)
-    group = _group(followers, (lower, _tidy(high)), made, mimic=mimic, **ahead)
+    group = _group(followers, (lower, _tidy(high)), (low, high), tips, drives, mimic=mimic)
     postures = tuple(_led_to(followers, low + (high - low) * part) for part in OPENINGS)
     where = f"{leader.name} at {postures[0][leader.name]:g} {leader.unit}"
     reasons = [f"{name}: +1 opens it, with {where}, as the finger tips part there"]
-    if linkage:
-        led = " and ".join(linkage.leaders)
+    if group.leaders:
+        led = " and ".join(group.leaders)
         reasons.append(f"{name}: a linkage, in which all joints go where {led} are")
     return group, postures, tuple(reasons)
 
@@ -292,12 +288,16 @@ def _one(
 def _group(
     followers: Sequence[MimicJoint],
     span: tuple[float, float],
-    drives: Sequence[Drive],
+    way: tuple[float, float],
+    tips: Fingertips,
+    drives: Drives,
     *,
     mimic: bool = True,
-    **more: Any,
 ) -> JointGroup:
-    """Return the group of joints that one value drives, within a span."""
+    """Return the group of joints that one value drives, within a span, and goes a way."""
+    linkage = find_linkage(followers, way, tips, drives)
+    made = linkage.drives if linkage else [drives.gripping(f.joint) for f in followers]
+    ahead: dict[str, Any] = {"leaders": linkage.leaders, "lead": linkage.lead} if linkage else {}
     return JointGroup(
         tuple(f.joint.name for f in followers),
         lower=span[0],
@@ -308,19 +308,22 @@ def _group(
         unit=followers[0].joint.unit,
         reset_noise=False,
         limits=tuple(f.joint.span for f in followers),
-        **drive_fields(drives),
-        **more,
+        **drive_fields(made),
+        **ahead,
     )
 
 
-def _apart(tips: Fingertips, followers: Sequence[MimicJoint], lead: float) -> float:
-    return tips.apart({f.joint.name: f.at(lead) for f in followers})
+def _apart(
+    tips: Fingertips, followers: Sequence[MimicJoint], lead: float, ends: Iterable[str] = ()
+) -> float:
+    return tips.apart({f.joint.name: f.at(lead) for f in followers}, ends)
 
 
 def _many(
     name: str,
     leaders: Sequence[ModelJoint],
     followers: Mapping[str, Sequence[MimicJoint]],
+    tips: Fingertips,
     drives: Drives,
 ) -> Gripper:
     """Return the groups of a hand whose fingers move each on its own."""
@@ -337,7 +340,7 @@ def _many(
             own = f"{name}_{re.sub('[^A-Za-z0-9]+', '_', leader.name).strip('_').lower()}"
             while own in groups:
                 own += "_"
-            groups[own] = _group(led, leader.span, [drives.gripping(f.joint) for f in led])
+            groups[own] = _group(led, leader.span, leader.span, tips, drives)
     counts = f"{len(leaders)} numbers drive it, one for each joint that mimics none"
     postures: list[dict[str, float]] = []
     for part in OPENINGS:
@@ -402,7 +405,8 @@ def find_linkage(
     if not leaders:
         return None
     (low, high), fingers = span, len(leaders)
-    travel = abs(_apart(tips, followers, high) - _apart(tips, followers, low)) / (high - low)
+    ways = [_apart(tips, followers, lead, leaders.values()) for lead in span]
+    travel = abs(ways[1] - ways[0]) / (high - low)
     press = _press(followers, fingers, travel)
     moved = sum(f.multiplier**2 * drives.moved_by(f.joint) for f in followers) / fingers
     # A hand that closes within a control step hits what it takes; motors are not as fast.

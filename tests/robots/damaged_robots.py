@@ -60,6 +60,8 @@ def shape(inside: str, kind: str = "collision") -> str:
     return INERTIAL + SHAPE + f"<{kind}><geometry>{inside}</geometry></{kind}>"
 
 
+SEEN = SHAPE.replace("collision", "visual")
+ENDS = "link {!r} ends what collides, and has no collision: it collides as it looks"
 OF_BOX = "took that of a box of 2 kg and the size of its shapes, 0.1 × 0.2 × 0.3 m"
 OF_BALL = "took that of a ball of 2 kg and 1000 kg/m³, as it has no shape"
 
@@ -91,12 +93,23 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "no mass, only seen": (
         with_tip(
-            inertial('<mass value="0"/>') + SHAPE.replace("collision", "visual"),
+            inertial('<mass value="0"/>') + SEEN,
         ),
         (
-            "link 'tip' has no mass: took 1000 kg/m³; and no inertia: took that of a box of 6 kg"
-            " and the size of its shapes, 0.1 × 0.2 × 0.3 m",
+            ENDS.format("tip"),
+            "link 'tip' has no mass: mass and inertia follow from its collision shapes and"
+            " 1000 kg/m³",
         ),
+    ),
+    "an end that is only seen": (
+        robot(
+            joint("shoulder", "base", "upper"),
+            joint("mount", "upper", "jaw", kind="fixed", inside=""),
+            joint("gripper", "jaw", "tip"),
+            link("base"),
+            *(link(name, INERTIAL + SEEN) for name in ("upper", "jaw", "tip")),
+        ),
+        (ENDS.format("upper"), ENDS.format("jaw"), ENDS.format("tip")),
     ),
     "no mass and no shape": (
         with_tip(inertial("", tensor("0.1 0.1 0.1"))),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robots import DescriptorError, RobotDescriptor, RobotRegistry
+from robots import ActionSplit, DescriptorError, RobotDescriptor, RobotRegistry
 from robots.gripper_motion import SHARES, aiming_joints, gripper_motion
 
 
@@ -67,6 +67,7 @@ def test_force_and_step_are_inverse(name: str):
     motion = gripper_motion(load(name))
     force = motion.force(1e-4, 0.5)
     assert motion.pressing(force, 0.5) * motion.slope(0.5) == pytest.approx(1e-4)
+    assert motion.slope(1.2) == pytest.approx(motion.slope(1.04))  # forced beyond its end
 
 
 def test_a_gripper_that_stays_where_it_is_has_no_two_ends():
@@ -105,3 +106,20 @@ def test_a_head_and_the_torso_that_carries_it_do_not_aim_an_arm(
     robot = RobotRegistry.load(name)
     arm = robot.parts[limb] if limb else robot
     assert set(arm.arm_joints) - set(aiming_joints(robot, arm)) == set(others)
+
+
+def test_of_a_linkage_only_its_leaders_press():
+    panda = load("panda")
+    groups = panda.action_split.groups
+    led = replace(groups["gripper"], leaders=("panda_finger_joint1",), lead=0.01)
+    robot = replace(panda, action_split=ActionSplit(**{**groups, "gripper": led}))
+    whole, half = gripper_motion(panda), gripper_motion(robot)
+    assert half.force(1e-4, 0.5) == pytest.approx(whole.force(1e-4, 0.5) / 2)
+
+
+def test_jaws_that_stay_apart_when_closed_are_open_by_so_much():
+    panda = load("panda")
+    groups = panda.action_split.groups
+    ajar = replace(groups["gripper"], lower=0.006, upper=0.04)
+    motion = gripper_motion(replace(panda, action_split=ActionSplit(**{**groups, "gripper": ajar})))
+    assert motion.openings[[0, -1]] == pytest.approx((0.012, 0.08), abs=1e-4)

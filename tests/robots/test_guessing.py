@@ -337,6 +337,7 @@ class TestHands:
             "gripper_root2": (("root2", "end2"), True),
         }
         assert groups["gripper_root1"].followers == ((1.0, 0.0), (0.5, 0.1))
+        assert groups["gripper_root1"].leaders == ("root1",)  # each finger is a linkage
 
     def test_the_hand_of_a_robot_whose_names_say_nothing_is_told_by_its_size(self, tmp_path):
         parts, last = single_arm(end="")
@@ -397,11 +398,11 @@ class TestFingers:
         assert fingers.opening_signs == (1, -1)
         assert fingers.opening_axes == (axis, axis)
 
-    @pytest.mark.parametrize("jaw", ["jaw", "a_link_fngr"])
-    def test_a_jaw_opens_across_the_way_from_its_hinge(self, tmp_path, jaw):
+    @pytest.mark.parametrize(("jaw", "wide"), [("jaw", 1.0), ("a_link_fngr", 2.2)])
+    def test_a_jaw_opens_across_the_way_from_its_hinge(self, tmp_path, jaw, wide):
         parts, last = single_arm(end="")
         parts.link(jaw, 0.05, "0.08 0.01 0.02", "0.05 0 0")
-        parts.joint("a_f1x", last, jaw, "0.03 0 0.03", axis="0 -1 0", limits=(0.0, 1.0))
+        parts.joint("a_f1x", last, jaw, "0.03 0 0.03", axis="0 -1 0", limits=(0.0, wide))
         fingers = guess(parts, tmp_path).descriptor.fingers
         assert fingers.links == (last, jaw)
         assert fingers.max_angle == 110.0
@@ -421,8 +422,8 @@ class TestFingers:
                         limits=(0.0, 0.8))  # fmt: skip
         fingers = guess(parts, tmp_path).descriptor.fingers
         assert fingers.links == (thumb, index if known else ring)
-        assert fingers.opening_signs == (-1, 1)
-        assert fingers.opening_axes[0][2] > 0.9
+        signed = np.array(fingers.opening_axes) * np.array(fingers.opening_signs)[:, None]
+        assert (signed[0, 2], signed[1, 2]) == pytest.approx((-0.82, 0.82), abs=0.05)
 
     def test_a_finger_with_two_tips_grasps_with_one_of_them(self, tmp_path):
         """As a Talos has it: a broad finger with a tip at each end, and a narrow one."""

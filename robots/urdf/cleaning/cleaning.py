@@ -18,7 +18,7 @@ from xml.etree.ElementTree import Element, tostring
 
 from robot_layouts.core.errors import AssetError
 from robots.urdf.checks import link_of
-from robots.urdf.cleaning.links import repair_inertia, repair_shapes
+from robots.urdf.cleaning.links import fill_ends, repair_inertia, repair_shapes
 from robots.urdf.cleaning.references import file_states, repair_references
 from robots.urdf.cleaning.xacro_files import drop_leftovers, is_unfinished
 from robots.urdf.paths import opened_folders
@@ -73,9 +73,9 @@ def is_template(xml: bytes, urdf: str) -> bool:
 
 @lru_cache(maxsize=64)
 def _first_look(xml: bytes, urdf: str) -> tuple[bool, tuple[str, ...]]:
-    """Return whether a URDF is a template, and the meshes that it collides with."""
+    """Return whether a URDF is a template, and its meshes."""
     root, _ = _parse_damaged(xml, urdf)
-    meshes = [mesh.get("filename", "") for mesh in root.iterfind("link/collision/geometry/mesh")]
+    meshes = [mesh.get("filename", "") for mesh in root.iterfind("link/*/geometry/mesh")]
     return is_unfinished(root), tuple(meshes)
 
 
@@ -276,5 +276,6 @@ _STEPS: tuple[Callable[[Element, str], Iterator[str]], ...] = (
     _repair_joints,
     repair_references,
     repair_shapes,
+    fill_ends,
     repair_inertia,
 )

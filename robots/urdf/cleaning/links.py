@@ -18,6 +18,7 @@ from robots.urdf.checks import (
     SMALLEST_SIZE,
     attributes_of,
     inertia_problems,
+    link_of,
     moved_links,
     sizes_of,
 )
@@ -52,6 +53,55 @@ def repair_shapes(root: Element, urdf: str) -> Iterator[str]:
                 if reason := _why_nothing(element, kind, f"{urdf}, link {name!r}", urdf):
                     link.remove(element)
                     yield f"link {name!r}: a {kind} {reason}, left out"
+
+
+def fill_ends(root: Element, urdf: str) -> Iterator[str]:
+    """Have the end of an arm collide as it looks, if the arm does and its end does not.
+
+    That is its last body, or the last two, as a single jaw closes on what carries it. A joint
+    without limits ends in a wheel or a flange, which is left as it is.
+
+    Args:
+        root: The ``<robot>``.
+        urdf: Its path, by which it refers to meshes.
+    """
+    links = {link.get("name", ""): link for link in root.iterfind("link")}
+    moving = {link_of(j, "child"): j for j in root.iterfind("joint") if j.get("type") != "fixed"}
+    first = _first_rigid(root)
+    solid = {first[name] for name, link in links.items() if link.find("collision") is not None}
+    carriers = {end: first.get(link_of(joint, "parent"), "") for end, joint in moving.items()}
+    found: set[str] = set()
+    for end, carrier in carriers.items():
+        bare = [end] if carrier in solid else [end, carrier]
+        last = end not in carriers.values() and moving[end].get("type") != "continuous"
+        if last and end not in solid and carriers.get(bare[-1]) in solid:
+            found |= {*bare}
+    for name, link in links.items():
+        drawn = link.findall("visual") if first[name] in found else []
+        shapes = [shape for shape in drawn if _is_solid(shape, f"{urdf}, link {name!r}", urdf)]
+        for shape in shapes:
+            parts = (part for part in shape if part.tag in ("origin", "geometry"))
+            SubElement(link, "collision").extend(map(deepcopy, parts))
+        if shapes:
+            yield f"link {name!r} ends what collides, and has no collision: it collides as it looks"
+
+
+def _first_rigid(root: Element) -> dict[str, str]:
+    """Return for each link the first one that is rigid with it, seen from the root."""
+    fixed = [joint for joint in root.iterfind("joint") if joint.get("type") == "fixed"]
+    first = {link.get("name", ""): link.get("name", "") for link in root.iterfind("link")}
+    for _ in fixed:  # each may stand before the one that carries it
+        for joint in fixed:
+            first[link_of(joint, "child")] = first.get(link_of(joint, "parent"), "")
+    return first
+
+
+def _is_solid(visual: Element, where: str, urdf: str) -> bool:
+    """Tell whether a ``<visual>`` can be collided with: its file is there, and has a volume."""
+    shapes = visual.findall("geometry/*")
+    if len(shapes) != 1 or _why_nothing(visual, "collision", where, urdf):
+        return False
+    return shapes[0].tag != "mesh" or _corners(visual, where, urdf) is not None
 
 
 def _take_apart(link: Element, kind: str) -> Iterator[str]:
