@@ -99,8 +99,8 @@ def working_factors(
     """Return by which factor what arms do is larger than for a task's own, and how far they stand.
 
     By their reach, and no more than by how far they get with their grippers down if they hold
-    things. What the task's own do is in reach of the one of them that reaches least, but where more
-    is needed.
+    things. What the task's own do is in reach of the one of them that reaches least, unless it is
+    said how far a place needs.
 
     Args:
         layout: The robots.
@@ -116,8 +116,10 @@ def working_factors(
     scales, distances = list[float](), list[list[float]]()
     for held in ((), holding):
         reaches, usual = (working_reaches(each, places, held) for each in (layout, own))
-        least = min(usual)
-        wanted = [max(least, needed.get(place, 0.0)) for place in places]
+        wanted = [min(usual)] * len(usual)
+        for i, place in enumerate(places):
+            if place in needed:
+                wanted[i] = needed[place] * usual[i] / own.arm(place).robot.reach
         scales.append(min(reach / want for reach, want in zip(reaches, wanted, strict=True)))
         distances.append(farther(reaches, wanted))
     return min(scales), [min(pair) for pair in zip(*distances, strict=True)]
