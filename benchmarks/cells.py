@@ -27,12 +27,13 @@ from benchmarks.records import (
     write_page,
     write_record,
 )
+from benchmarks.skills import robot_of
 from robot_layouts.experts import find_expert
-from robots import RobotLayoutsError, RobotRegistry, TaskError
+from robots import RobotLayoutsError, TaskError
 from tasks import Needs, get_task_class, list_tasks, make
 from tasks.episode import play
 
-ROBOTS = ("so101", "xarm7", "z1", "fetch", "ur10")
+ROBOTS = ("so101", "xarm7", "xarm7_with_panda", "z1", "fetch", "ur10")
 PAIRED = ("so101", "xarm7", "panda", "z1", "ur5", "ur10")  # of which two makes are drawn
 PATIENCE = 150  # s that an expert may plan an episode
 MIXED = (
@@ -60,7 +61,8 @@ def cells(
     """Let experts of cells play with other robots in all roles that admit them, and with mixtures.
 
     Args:
-        robots: Of what makes, by their names in the catalogue; none leaves mixtures.
+        robots: Of what makes, by their names in the catalogue, or as ARM_with_HAND; none leaves
+            mixtures.
         tasks: Which cells; all of those that fit their robots if not given.
         seeds: How many episodes of each; those in the record are not played again.
         pairs: Of how many pairs of makes each cell is also played, which take its roles in turn.
@@ -140,7 +142,7 @@ def _cases(
 
 def _roles(task: str, robot: str) -> list[str]:
     """Return the places of a task that a robot can fill."""
-    cls, fingers = get_task_class(task), RobotRegistry.load(robot).fingers is not None
+    cls, fingers = get_task_class(task), robot_of(robot).fingers is not None
     anyone = cls.needs.get("*", Needs())
     return [role for role in cls.layout if fingers or not cls.needs.get(role, anyone).fingers]
 
@@ -151,7 +153,8 @@ def _played(task: str, seen: Record, seeds: int) -> Iterator[None]:
     if not missing:
         return
     try:
-        env = make(task, robots=seen["robots"], obs_mode="none")
+        named = {role: robot_of(name) for role, name in seen["robots"].items()}
+        env = make(task, robots=named, obs_mode="none")
     except RobotLayoutsError as error:
         seen["episodes"] |= dict.fromkeys(missing, _first_line(error))
         yield

@@ -50,17 +50,17 @@ def apart(one: RobotDescriptor, other: RobotDescriptor) -> float:
     return larger if smaller < UNEQUAL * larger else max(HAND_OVER * (smaller + larger), larger)
 
 
-def farther(reaches: Sequence[float], own: Sequence[float]) -> list[float]:
+def farther(reaches: Sequence[float], needed: Sequence[float]) -> list[float]:
     """Return by which factors robots stand farther from what they do than those they stand in for.
 
-    What those do is in reach of the one of them that reaches least. One that reaches less than that
-    stands nearer; none stands farther than as all of them reach farther.
+    One that reaches less than is needed stands nearer; none stands farther than as all of them
+    reach farther.
 
     Args:
         reaches: How far the robots reach (m).
-        own: How far those do that they stand in for (m).
+        needed: How far they would have to where those stand (m).
     """
-    factors = [reach / min(own) for reach in reaches]
+    factors = [reach / need for reach, need in zip(reaches, needed, strict=True)]
     most = max(1.0, min(factors))
     return [min(factor, most) for factor in factors]
 

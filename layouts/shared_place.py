@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Container, Iterable, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from math import sqrt
@@ -90,18 +90,24 @@ def shared_place(
 
 
 def working_factors(
-    layout: Arrangement, own: Arrangement, places: Collection[str], holding: Container[str]
+    layout: Arrangement,
+    own: Arrangement,
+    places: Collection[str],
+    holding: Container[str],
+    needed: Mapping[str, float],
 ) -> tuple[float, list[float]]:
     """Return by which factor what arms do is larger than for a task's own, and how far they stand.
 
     By their reach, and no more than by how far they get with their grippers down if they hold
-    things.
+    things. What the task's own do is in reach of the one of them that reaches least, unless it is
+    said how far a place needs.
 
     Args:
         layout: The robots.
         own: The task's own.
         places: The arms, by their places.
         holding: The places whose robots hold things.
+        needed: How far arms have to reach where the task's own stand, by place (m).
 
     Returns:
         How much larger it is, and for each arm how much farther from the middle it stands; see
@@ -110,8 +116,12 @@ def working_factors(
     scales, distances = list[float](), list[list[float]]()
     for held in ((), holding):
         reaches, usual = (working_reaches(each, places, held) for each in (layout, own))
-        scales.append(min(reaches) / min(usual))
-        distances.append(farther(reaches, usual))
+        wanted = [min(usual)] * len(usual)
+        for i, place in enumerate(places):
+            if place in needed:
+                wanted[i] = needed[place] * usual[i] / own.arm(place).robot.reach
+        scales.append(min(reach / want for reach, want in zip(reaches, wanted, strict=True)))
+        distances.append(farther(reaches, wanted))
     return min(scales), [min(pair) for pair in zip(*distances, strict=True)]
 
 

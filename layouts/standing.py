@@ -41,6 +41,7 @@ def at_task(
     task: Layout | Any,
     *,
     holding: Collection[str] | None = None,
+    needed: Mapping[str, float] | None = None,
 ) -> Layout:
     """Return a task's layout with other robots, each where it reaches what the task's own does.
 
@@ -62,6 +63,8 @@ def at_task(
         task: The task, its class, or a layout with its places.
         holding: Places whose robots hold things; None for those that the task says need a gripper
             which opens so wide.
+        needed: How far arms have to reach where the task's own stand, by place (m); None for what
+            the task says.
 
     Raises:
         LayoutError: If the task has no layout, or more places than the robot has limbs.
@@ -91,10 +94,11 @@ def at_task(
             raise UnknownNameError("robot of this layout", place, layout)
     middle = _middle(layout)
     holding = held_widths(task, layout) if holding is None else holding
+    needed = needed_reaches(task, layout) if needed is None else needed
     places = {place: _starting(at, loaded.get(place, at.robot)) for place, at in layout.items()}
     after = Layout(places, layout.frames)
-    _, factors = working_factors(after, layout, [*layout], holding)
-    _, by_reach = working_factors(after, layout, [*layout], ())
+    _, factors = working_factors(after, layout, [*layout], holding, needed)
+    _, by_reach = working_factors(after, layout, [*layout], (), needed)
 
     def placed(share: float) -> Layout:
         moved = dict(layout)
@@ -150,9 +154,19 @@ def held_widths(task: Layout | Any, places: Iterable[str]) -> dict[str, float]:
         task: The task, or its class, whose ``needs`` say how wide grippers must open.
         places: Its places.
     """
+    return _needed(task, places, "opening")
+
+
+def needed_reaches(task: Layout | Any, places: Iterable[str]) -> dict[str, float]:
+    """Return how far a task's robots must reach, by place (m), where its ``needs`` say so."""
+    return _needed(task, places, "reach")
+
+
+def _needed(task: Layout | Any, places: Iterable[str], what: str) -> dict[str, float]:
+    """Return a length that a task's places need, by place (m), where they need it."""
     needs = getattr(task, "needs", {})
-    found = {place: needs.get(place, needs.get("*")) for place in places}
-    return {place: need.opening for place, need in found.items() if need and need.opening}
+    found = {place: getattr(needs.get(place, needs.get("*")), what, None) for place in places}
+    return {place: length for place, length in found.items() if length}
 
 
 def _with(placement: Placement, robot: RobotDescriptor) -> Placement:

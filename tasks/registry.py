@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from layouts import Layout, Placement, at_task
 from layouts.placement import RobotLike, load_robot
-from layouts.standing import held_widths
+from layouts.standing import held_widths, needed_reaches
 from robot_layouts.core.bounds import shown
 from robot_layouts.core.catalogue import Catalogue, reason
 from robots import RobotDescriptor, RobotLayoutsError, TaskError, UnknownNameError, closest_match
@@ -389,7 +389,8 @@ def _replace_robots(
         if cls.robot_counts is None:
             _refuse_bodies(cls, robots)
         if cls.fits() and robots:
-            return at_task(robots, layout, holding=held_widths(cls, layout))
+            held, needed = held_widths(cls, layout), needed_reaches(cls, layout)
+            return at_task(robots, layout, holding=held, needed=needed)
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         return Layout({**layout, **changed}, layout.frames)
     if isinstance(robots, (str, PathLike, RobotDescriptor)):

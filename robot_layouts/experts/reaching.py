@@ -6,13 +6,14 @@ from collections.abc import Callable, Sequence
 from math import pi
 from typing import Any
 
-from robot_layouts.experts.geometry import gripper_facing, heading
+from robot_layouts.experts.geometry import gripper_facing, heading, turn
 from robot_layouts.experts.script import Pose, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
-from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.kinematics.rotations import Floats, multiply
 from tasks import TaskEnv
 
 POSE_JOINTS = 6  # of an arm that can choose how its TCP is turned
+ROLLS = (0.0, pi, pi / 2, -pi / 2)  # about its approach, of a tip that is round (rad)
 LEANS = (0.0, pi / 6, pi / 3, pi / 2, -pi / 6)  # from straight down (rad)
 
 
@@ -42,17 +43,25 @@ def reaching(
     arm = task.layout.arm(robot).robot
     if len(arm.arm_joints) < POSE_JOINTS or arm.tcp_position_links:
         return Waypoint(name, at=place, **others)
+    rolls = (0.0,) if arm.fingers is not None else ROLLS
 
     def poses(scene: Scene) -> list[Pose]:
         point = place(scene)
         ahead = heading(scene.base(robot), point)
         own = [(point, scene.tcp(robot)[1])] if as_it_is else []
-        usual = [*own, *((point, gripper_facing(ahead, lean)) for lean in leans)]
+        usual = [*own, *leaning(point, ahead, leans)]
         if not farther:
             return usual
         solver, qpos = pose_solver(task, robot), scene.qpos(robot)
         if any(solver.solve(*scene.in_world(pose), qpos) is not None for pose in usual):
             return usual
-        return [(point, gripper_facing(ahead, lean)) for lean in farther]
+        return leaning(point, ahead, farther)
+
+    def leaning(point: Floats, ahead: float, leans: Sequence[float]) -> list[Pose]:
+        return [
+            (point, multiply(gripper_facing(ahead, lean), turn("z", roll)))
+            for lean in leans
+            for roll in rolls
+        ]
 
     return Waypoint(name, to=poses, **others)

@@ -35,7 +35,7 @@ class CellFillDrawer(CellTask):
             "shutter": Placement("ur10", (-0.8, 0.0, 0.0)),
         }
     )
-    needs = {"opener": FINGERS, "filler": FINGERS}
+    needs = {"opener": FINGERS, "filler": FINGERS, "shutter": Needs(reach=0.95)}
     max_episode_steps = 250
     stages = {"is_open": 0.3, "is_inside": 0.7, "success": 1.0}
     viewpoint = ((1.2, -0.8, 1.1), (0.0, 0.0, 0.1))

@@ -62,7 +62,9 @@ class CellOpenBox(CellTask):
         "Keep the lid up until the red cube and the blue one are in the box.",
     )
     layout = ring({"opener": "ur10", "right": "franka_panda", "left": "panda"}, radius=0.78)
-    needs = {arm: Needs(fingers=True, opening=2 * HALF) for arm in PACKERS}
+    needs = {arm: Needs(fingers=True, opening=2 * HALF) for arm in PACKERS} | {
+        "opener": Needs(reach=0.7)
+    }
     max_episode_steps = 300
     stages = {"is_open": 0.3, "is_one_in": 0.5, "are_both_in": 0.8, "success": 1.0}
     viewpoint = ((0.9, -0.9, 0.8), (0.0, 0.0, 0.1))

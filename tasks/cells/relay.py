@@ -46,7 +46,7 @@ class CellRelay(CellTask):
             "packer": Placement("panda", (0.0, 0.8, 0.0), rpy=(0.0, 0.0, -pi / 2)),
         }
     )
-    needs = {"packer": Needs(fingers=True, opening=2 * HALF)}
+    needs = {"second": Needs(reach=1.1), "packer": Needs(fingers=True, opening=2 * HALF)}
     max_episode_steps = 400
     stages = {"is_at_corner": 0.3, "is_at_end": 0.6, "is_held": 0.8, "success": 1.0}
     viewpoint = ((1.2, 0.6, 1.1), (0.0, 0.0, 0.0))

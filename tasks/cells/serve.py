@@ -33,7 +33,9 @@ class CellServe(CellTask):
             "ringer": Placement("panda_stick", (-0.65, 0.375, 0.0), rpy=(0.0, 0.0, -pi / 6)),
         }
     )
-    needs = {arm: Needs(fingers=True, opening=0.066) for arm in ("waiter", "server")}
+    needs = {arm: Needs(fingers=True, opening=0.066) for arm in ("waiter", "server")} | {
+        "ringer": Needs(reach=0.75)
+    }
     max_episode_steps = 300
     stages = {"is_brought": 0.3, "is_held": 0.5, "is_served": 0.8, "success": 1.0}
     viewpoint = ((1.2, 1.2, 1.1), (0.0, 0.0, 0.1))

@@ -12,6 +12,7 @@ from tasks import (
     CellTask,
     Cuboid,
     Friction,
+    Needs,
     State,
     is_at_rest,
     register_task,
@@ -47,6 +48,7 @@ class CellSqueezeBox(CellTask):
             "pusher": Placement("ur10", (0.0, -1.1, 0.0), rpy=(0.0, 0.0, pi / 2)),
         }
     )
+    needs = {"pusher": Needs(reach=1.05)}
     max_episode_steps = 300
     stages = {"are_both_at": 0.2, "is_lifted": 0.4, "is_plinth_under": 0.7, "success": 1.0}
     viewpoint = ((1.0, 1.1, 0.9), (0.0, 0.0, 0.1))

@@ -47,7 +47,7 @@ class CellStowTwo(CellTask):
         {"opener": "panda", "right": "franka_panda", "holder": "ur10", "left": "panda_wristcam"},
         radius=0.8,
     )
-    needs = {"opener": FINGERS, "left": FINGERS, "right": FINGERS}
+    needs = {arm: FINGERS for arm in ("opener", "left", "right")} | {"holder": Needs(reach=0.7)}
     max_episode_steps = 350
     stages = {"is_open": 0.3, "is_one_in": 0.5, "are_both_in": 0.7, "success": 1.0}
     viewpoint = ((1.2, -0.8, 1.1), (0.0, 0.0, 0.1))

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 from layouts import Layout
-from layouts.standing import held_widths
+from layouts.standing import held_widths, needed_reaches
 from robot_layouts.simulation import Camera
 from robots import LayoutError, MissingPackageError, RobotDescriptor, TaskError
 from tasks.engine.scenario import Scenario
@@ -32,7 +32,7 @@ def built_layout(task_class: type[Task], scenario: Scenario) -> Layout:
     counts, needs = task_class.robot_counts, task_class.needs
     check_places(name, given, places, counts, scenario.bystanders)
     if task_class.fits():
-        needs = {place: replace(need, opening=None) for place, need in needs.items()}
+        needs = {place: replace(need, opening=None, reach=None) for place, need in needs.items()}
     check_needs(name, given, given.places if counts else places, needs)
     still = _settled(given, places, counts, scenario.bystanders)
     return still.in_control_mode(scenario.control_mode)
@@ -46,8 +46,9 @@ def fitted(task_class: type[Task], layout: Layout) -> dict[str, Any]:
     Raises:
         TaskError: If no place is in reach of both arms.
     """
-    held = held_widths(task_class, task_class.layout.places)
-    fit = fit_to(layout, task_class.layout, held, task_class.table.outline(layout))
+    own = task_class.layout
+    held, needed = (of(task_class, own.places) for of in (held_widths, needed_reaches))
+    fit = fit_to(layout, own, held, needed, task_class.table.outline(layout))
     if fit.as_declared:
         return {}
     eye, target = map(fit.place, task_class.viewpoint)

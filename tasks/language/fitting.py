@@ -29,20 +29,27 @@ _DIGITS = 3  # of places and turns: bases are rounded, too
 
 
 def fit_to(
-    layout: Layout, declared: Layout, held: Mapping[str, float], table: Rectangle | None = None
+    layout: Layout,
+    declared: Layout,
+    held: Mapping[str, float],
+    needed: Mapping[str, float],
+    table: Rectangle | None = None,
 ) -> Fit:
     """Return how a declaration fits other robots, or others' places.
 
-    It is turned as the arms are about their middle, and as much larger as the one that reaches
-    least reaches farther than the task's own, unless that is more than grippers can hold or than
-    there is room. Its origin lies where it does in `layouts.at_task`, or, if it is for two arms or
-    one, where they reach well, as near to that as they do.
+    It is turned as the arms are about their middle, and as much larger as each of them reaches
+    farther than its place needs, or than the one of the task's own that reaches least, unless that
+    is more than grippers can hold or than there is room. Its origin lies where it does in
+    `layouts.at_task`, or, if it is for two arms or one, where they reach well, as near to that as
+    they do.
 
     Args:
         layout: The robots that are to do the task.
         declared: The task's own layout.
         held: Width of the widest body that each of them holds, as declared, by place (m); those
             that hold none are left out.
+        needed: How far arms have to reach where the task's own stand, by place (m), where the task
+            says so.
         table: Outline of the table, x_min, y_min, x_max, y_max (m).
 
     Raises:
@@ -53,7 +60,7 @@ def fit_to(
     own = [declared.arm(place) for place in declared.places]
     if all(_alike(*pair) for pair in zip(arms, own, strict=True)):
         return AS_DECLARED
-    scale, factors = working_factors(layout, declared, declared.places, held)
+    scale, factors = working_factors(layout, declared, declared.places, held, needed)
     if held:
         widest = max(held.values())
         scale = min([scale, *(_holds(arm.robot) / widest for arm in arms if _opening(arm.robot))])

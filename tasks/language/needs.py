@@ -22,7 +22,8 @@ class Needs:
             never true.
         opening: How wide its gripper must open (m). That of jaws that swing is not known, and is
             not held against them.
-        reach: How far its TCP must reach from its base axis (m).
+        reach: How far its TCP must reach from its base axis (m). No robot is refused for that by a
+            task that fits its robots: one that reaches less stands nearer, and makes it smaller.
         tcp_is_link: Whether its TCP must be a link, not a point between several.
 
     Raises:

@@ -16,12 +16,12 @@ from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
 from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
 from benchmarks.robots.judge import EXPECTED, expected_of, read_expectations
+from benchmarks.skills import robot_of
 from objects import ObjectRegistry
 from objects.registry import CATALOGUE
 from robot_layouts.data.receipts import Receipt
 from robot_layouts.data.receipts.provenance import describe_task
 from robot_layouts.data.suite.results import result_of
-from robots import RobotRegistry
 from tasks import Needs, get_task_class
 
 ROOT = DOCS.parent
@@ -138,7 +138,7 @@ def test_what_the_page_of_cells_promises():
             admitted = {
                 role
                 for role in cls.layout
-                if RobotRegistry.load(name).fingers is not None
+                if robot_of(name).fingers is not None
                 or not cls.needs.get(role, cls.needs.get("*", Needs())).fingers
             }
             assert seen["robots"] == dict.fromkeys(sorted(admitted, key=[*cls.layout].index), name)

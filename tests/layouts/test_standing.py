@@ -51,6 +51,16 @@ def test_what_the_roles_do_is_in_reach_of_the_one_that_reaches_least():
     assert distances["near"] == pytest.approx(0.8 * 0.48 / 0.855, abs=1e-3)
 
 
+def test_a_shorter_arm_stands_nearer_where_its_place_needs_a_longer_one():
+    """What a UR10 does beyond the middle, an arm that reaches less does from nearer."""
+    two = ring({"far": "ur10", "near": "panda"}, radius=0.8)
+    placed = at_task({"far": "panda"}, two, needed={"far": 1.1})
+    assert abs(complex(*placed["far"].base_position[:2])) == pytest.approx(
+        0.8 * 0.855 / 1.1, abs=1e-3
+    )
+    assert placed["near"] == two["near"]
+
+
 def test_where_all_reach_farther_a_large_arm_of_the_task_stands_farther_too():
     three = ring({"far": "ur10", "near": "panda", "other": "panda"}, radius=0.8)
     placed = at_task({"near": "ur10", "other": "ur10"}, three)

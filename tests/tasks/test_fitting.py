@@ -55,6 +55,12 @@ def test_other_robots_stand_where_they_reach_as_far(robots):
     assert tasks.make(TASK, robots=robots).layout == at_task(robots, task)
 
 
+def test_a_task_is_as_small_as_the_place_asks_whose_robot_reaches_too_little():
+    """The Panda pushes the block where the UR10 of the cell needs 1.1 m."""
+    env = tasks.make("CellRelay-v1", robots={"second": "panda"})
+    assert env.task.fit.scale == pytest.approx(0.855 / 1.1)
+
+
 def test_cameras_see_what_is_smaller_from_nearer():
     env = tasks.make(TASK, robots={"left": "so100"})
     fit, (own,) = env.task.fit, env.task_class.cameras

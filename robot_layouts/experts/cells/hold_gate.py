@@ -28,7 +28,8 @@ from robot_layouts.kinematics.rotations import inverse, rotate
 from tasks import TaskEnv
 from tasks.cells.hold_gate import LONG, THICK, CellHoldGate
 
-WIDE, PULLS = 1.5, 10  # rad; how far the leaf is pulled open, and in how many parts
+PULLS = 10  # in how many parts the leaf is pulled open
+TRIED = ((6, 1.5), (9, 1.5), (9, 1.3))  # parts of the bar's way; how wide the leaf opens (rad)
 AWAY = np.array([0.4, 0.0, 0.3])  # where the giver goes in the end, from its base (m)
 LEVEL = pi / 2 + 0.01  # rad; of a hand that pulls at the handle, with room for rounding
 BEFORE = 0.18  # m; of a hand from the handle, before it goes straight there
@@ -45,16 +46,16 @@ def hold_gate(task: TaskEnv, seed: int) -> Plan:
     """
     need_fingers(task, "handing a bar through a gate", *task.layout.arms)
     return first_success(
-        task, seed, lambda scene: [_script(task, count) for count in (6, 9)], as_declared=True
+        task, seed, lambda scene: [_script(task, *tried) for tried in TRIED], as_declared=True
     )
 
 
-def _script(task: TaskEnv, count: int) -> Script:
+def _script(task: TaskEnv, count: int, wide: float) -> Script:
     above, *others = pick("taker", "bar", partial(_grips, side=-HELD), ready=0.03, around=0.01)
     first, *then = pick("giver", "bar", partial(_grips, side=HELD), ready=0.03, around=0.01)
     opened, handed = f"porter.gate.leaf {PULLS - 1}", f"giver.there {count - 1}"
     return {
-        "porter": _holding(task, ["taker.over", "giver.leave"]),
+        "porter": _holding(task, wide, ["taker.over", "giver.leave"]),
         "giver": (
             replace(first, after=(opened,)),
             *then,
@@ -78,14 +79,14 @@ def _script(task: TaskEnv, count: int) -> Script:
     }
 
 
-def _holding(task: TaskEnv, done: Sequence[str]) -> tuple[Waypoint, ...]:
+def _holding(task: TaskEnv, wide: float, done: Sequence[str]) -> tuple[Waypoint, ...]:
     handle = thing_grips(CellHoldGate.gate.descriptor, "gate", 0.08, lean=LEVEL)
-    grips = in_reach(task, "porter", handle, above=BEFORE, on=_pull)
+    grips = in_reach(task, "porter", handle, above=BEFORE, on=partial(_pull, wide=wide))
     shutting = move_joint("porter", "gate", "leaf", 0.0, steps=PULLS)
     return (
         Waypoint("before", lambda scene: [backed_off(grip, BEFORE) for grip in grips(scene)]),
         *pick("porter", "gate.leaf", grips, ready=0.01, around=0.004),
-        *move_joint("porter", "gate", "leaf", WIDE, steps=PULLS),
+        *move_joint("porter", "gate", "leaf", wide, steps=PULLS),
         *(
             replace(waypoint, name=f"shut {i}", after=() if i else tuple(done))
             for i, waypoint in enumerate(shutting)
@@ -93,8 +94,8 @@ def _holding(task: TaskEnv, done: Sequence[str]) -> tuple[Waypoint, ...]:
     )
 
 
-def _pull(scene: Scene, grip: Pose) -> list[Pose]:
-    return [moved_along(scene, "gate", "leaf", share * WIDE, grip) for share in (0.3, 0.6, 1.0)]
+def _pull(scene: Scene, grip: Pose, wide: float) -> list[Pose]:
+    return [moved_along(scene, "gate", "leaf", share * wide, grip) for share in (0.3, 0.6, 1.0)]
 
 
 def _grips(scene: Scene, side: float) -> list[Pose]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-from robot_layouts.experts.cells.moves import lift_together, set_down
+from robot_layouts.experts.cells.moves import lift_together, set_down, stand_back
 from robot_layouts.experts.cells.tips import push
 from robot_layouts.experts.grasps import in_reach, need_fingers, thing_grips
 from robot_layouts.experts.rehearsal import Plan, first_success
@@ -51,13 +51,13 @@ def _script(task: TaskEnv, strokes: int) -> Script:
         grips,
         HEIGHT,
         onward=[*(partial(_nearer, left=MOVES - i) for i in range(MOVES)), _down],
-        turn_of=["north.away block"],
+        turn_of=["north.wait"],
         ready=0.03,
         around=0.01,
         opening=NARROW,
     )
     letting_go = set_down("pot", list(HANDLES), f"move {MOVES}", opening=NARROW)
-    north = push(task, "north", "block", corner, strokes=strokes)
+    north = (*push(task, "north", "block", corner, strokes=strokes), stand_back(task, "north"))
     return {"north": north, **{arm: (*lifting[arm], *letting_go[arm]) for arm in HANDLES}}
 
 

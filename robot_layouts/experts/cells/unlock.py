@@ -24,14 +24,14 @@ def unlock(task: TaskEnv, seed: int) -> Plan:
     return first_success(
         task,
         seed,
-        lambda scene: [_script(task, depth) for depth in (0.02, 0.04)],
+        lambda scene: [_script(task, *tried) for tried in ((0.02, 12), (0.04, 12), (0.04, 6))],
         as_declared=True,
     )
 
 
-def _script(task: TaskEnv, depth: float) -> Script:
+def _script(task: TaskEnv, depth: float, strokes: int) -> Script:
     point = np.array(CellUnlock.button.descriptor.points["top"].position)
-    draw = advance(task, "holder", "lock", partial(_on, BEHIND), _out, _left)[:-1]
+    draw = advance(task, "holder", "lock", partial(_on, BEHIND), _out, _left, strokes=strokes)[:-1]
     throw = sweep(task, "thrower", "lock", _throwing, after=[f"holder.{draw[-1].name}"])
     return {
         "holder": draw,
