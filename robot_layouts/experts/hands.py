@@ -70,6 +70,8 @@ class Hand:
         motion: How its gripper moves.
         length: How far it reaches (m).
         quick: Whether its fingers are where they are driven to after each control step.
+        light: Whether they are so because nothing but their own mass resists: such fingers are
+            driven into what they hold.
         columns: Indices of the arm's joints among the robot's, those of a head or a torso that are
             driven with it included.
         base: Pose of the robot's base in the world, (4, 4) (m).
@@ -101,11 +103,11 @@ class Hand:
         few = len(self._aiming) < FULL
         self._turn, self._worth = (ROUGH_TURN, TURN_WORTH) if few else (TURN, 1.0)
         self._simulator, seconds = task.scenario.simulator, 1 / task.scenario.control_frequency
+        grippers = [g for name, g in own.action_split.groups.items() if is_gripper(name) and g.size]
         self.quick = all(
-            np.min(group.stiffness) * seconds > QUICK * np.max(group.damping)
-            for name, group in own.action_split.groups.items()
-            if is_gripper(name) and group.size
+            np.min(group.stiffness) * seconds > QUICK * np.max(group.damping) for group in grippers
         )
+        self.light = self.quick and not any(np.any(group.armature) for group in grippers)
         self._random = scattered(self._tree.limits[self._aiming], RANDOM_STARTS)
 
     def grip(

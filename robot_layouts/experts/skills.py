@@ -52,7 +52,7 @@ GENTLY = 0.25  # of its speed, with what quick fingers hold, since each step of 
 SHUT = 0.005  # share of its opening from which on a gripper closes no further
 BACK = 0.05  # m; before a place, whence a thing or a gripper comes to it
 PITCHED = (0.0,), (pi / 6, -pi / 6), (pi / 3, -pi / 3)  # rad; of a hand otherwise out of reach
-DRAWN = (0.0, 0.005, 0.01)  # m; by which fingers take a thing nearer to their tips
+DRAWN = (0.0, 0.002, 0.005, 0.01)  # m; by which fingers take a thing nearer to their tips
 MOVES = 5  # poses on the way of a joint that are checked
 LEG, INWARD = 0.03, 0.003  # m; between waypoints of what goes straight, and into a hole
 TILT = pi / 8  # rad; between waypoints of what is turned
@@ -308,7 +308,7 @@ def taking(
         ),
         Waypoint(
             f"hold {body}",
-            squeeze=kept if hand.quick else holds.holding,
+            squeeze=kept if hand.light else holds.holding,
             steps=4,
             until=held,
             most=HELD,
