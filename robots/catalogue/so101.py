@@ -25,7 +25,7 @@ GRIPPER = JointGroup(
     upper=1.74533,
     stiffness=1000.0,
     damping=10.6,  # critical, with the motor's inertia
-    force_limit=10.0,
+    force_limit=2.94,
     armature=0.028,  # without it the jaw is so light that PhysX lets it sink into what it holds
     reset_noise=False,
     limits=((-0.174533, 1.74533),),
@@ -54,6 +54,6 @@ SO101 = RobotDescriptor(
     },
     reach=0.48,  # of the TCP, from the URDF
     source="example-robot-data 6.0.0, so_arm_description; drives from each joint's inertia,"
-    " that of the jaw's motor (STS3215) as in TheRobotStudio's MuJoCo model of the arm",
+    " inertia and force of the jaw's motor (STS3215) as in TheRobotStudio's MuJoCo model of the arm",
     allowed_collisions=(),
 )
