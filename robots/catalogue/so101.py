@@ -53,7 +53,7 @@ SO101 = RobotDescriptor(
         "rest": (0.0, -0.4, 0.4, 1.2, 0.0, 1.0),
     },
     reach=0.48,  # of the TCP, from the URDF
-    source="example-robot-data 6.0.0, so_arm_description; drives from each joint's inertia,"
-    " inertia and force of the jaw's motor (STS3215) as in TheRobotStudio's MuJoCo model of the arm",
+    source="example-robot-data 6.0.0, so_arm_description; drives from each joint's inertia, those"
+    " of the jaw's motor (STS3215) from TheRobotStudio's MuJoCo model of the arm",
     allowed_collisions=(),
 )
