@@ -17,11 +17,11 @@ from tests.fresh_process import in_fresh_process
 ROOT = str(Path(__file__).resolve().parents[1])
 MOST = {
     "make, first": 7_650,
-    "make, again": 2_800,
+    "make, again": 2_850,
     "step": 130,
     "plan": 12_500,
     "search": 73_000,
-    "from_urdf": 10_700,
+    "from_urdf": 11_000,
 }
 
 
