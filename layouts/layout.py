@@ -148,7 +148,7 @@ class Layout(Arrangement):
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If scipy is not installed.
         """
-        from layouts.export.urdf import write_drake
+        from layouts.export.drake import write_drake
 
         return write_drake(self, path, visuals=visuals)
 

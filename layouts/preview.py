@@ -26,6 +26,19 @@ if TYPE_CHECKING:
 
 
 HEADS = ("#", "name", "robot", "action", "base x, y, z (m)", "facing", "keyframe", "reach (m)")
+MOST_IN_NOTEBOOKS = 64  # robots in a notebook's picture
+NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+TABLE = "#EFE6D8"
+WIDTH = 8.0  # inches; 1200 pixels
+LEFT, RIGHT, ABOVE, BELOW = 0.75, 0.25, 0.5, 0.7  # around the plan (inches)
+MARGIN = 0.06  # free space on each side of the robots, in shares of the plan's larger side
+HEADING = 0.085  # length of the arrows, in the same shares
+PLAN_HEIGHTS = (3.5, 6.5)  # smallest and largest height of the plan (inches)
+ROW_HEIGHT = 0.3  # of the list under the plan (inches)
+LIST_START, LIST_WIDTH = 0.12, 0.87  # of the list's words, in shares of the picture's width
+LIST_SIZE, LIST_LETTERS = 10.5, 78  # of its letters (points), and how many of these fit on a line
+LONGEST_NAME, LONGEST_ROBOT = 16, 24  # letters
+TILE = 241  # grid points per side, from which the overlap is drawn
 
 
 def describe(layout: Arrangement) -> str:
@@ -83,22 +96,6 @@ def facing_text(placement: Placement) -> str:
 def decimal(value: float, digits: int = 3) -> str:
     """Round to ``digits`` decimals and drop trailing zeros; there is no minus zero."""
     return f"{round(value, digits) + 0.0:g}"
-
-
-MOST_IN_NOTEBOOKS = 64  # robots in a notebook's picture
-NO_METADATA = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-TABLE = "#EFE6D8"
-
-WIDTH = 8.0  # inches; 1200 pixels
-LEFT, RIGHT, ABOVE, BELOW = 0.75, 0.25, 0.5, 0.7  # around the plan (inches)
-MARGIN = 0.06  # free space on each side of the robots, in shares of the plan's larger side
-HEADING = 0.085  # length of the arrows, in the same shares
-PLAN_HEIGHTS = (3.5, 6.5)  # smallest and largest height of the plan (inches)
-ROW_HEIGHT = 0.3  # of the list under the plan (inches)
-LIST_START, LIST_WIDTH = 0.12, 0.87  # of the list's words, in shares of the picture's width
-LIST_SIZE, LIST_LETTERS = 10.5, 78  # of its letters (points), and how many of these fit on a line
-LONGEST_NAME, LONGEST_ROBOT = 16, 24  # letters
-TILE = 241  # grid points per side, from which the overlap is drawn
 
 
 def layout_html(layout: Arrangement) -> str:

@@ -21,6 +21,9 @@ from robots.assets.store import AssetStore
 from robots.fetch_assets import print_files, union
 from robots.urdf.mesh_files import ENDINGS
 
+OBJECT = Word("OBJECT", about="a name that `robot-layouts objects list` prints, a mesh, or an MJCF")
+NAME = Word("OBJECT", about="a name of the second list that `robot-layouts objects list` prints")
+
 
 def named_object(word: str, seed: int | None = None) -> ObjectDescriptor:
     """Return the thing that a word names.
@@ -38,9 +41,6 @@ def named_object(word: str, seed: int | None = None) -> ObjectDescriptor:
     if ending in (".xml", ".mjcf"):
         return ObjectDescriptor.from_mjcf(word)
     return ObjectRegistry.load(word, seed)
-
-
-OBJECT = Word("OBJECT", about="a name that `robot-layouts objects list` prints, a mesh, or an MJCF")
 
 
 def list_objects() -> int:
@@ -121,9 +121,6 @@ def _parts(thing: ObjectDescriptor) -> Iterator[str]:
 
 def _row(values: Iterable[float]) -> str:
     return "(" + ", ".join(f"{round(value, 6) + 0.0:.4g}" for value in values) + ")"
-
-
-NAME = Word("OBJECT", about="a name of the second list that `robot-layouts objects list` prints")
 
 
 def fetch(

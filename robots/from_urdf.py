@@ -35,6 +35,40 @@ from robots.urdf.srdf import read_semantics
 __all__ = ["Guess", "guess_descriptor"]
 
 URDF, MJCF = "urdf", "mjcf"  # as robot_descriptions has them, too
+_REGISTERED = """
+RobotRegistry.register({constant})  # from here on, it goes by its name: {name!r}
+"""
+_TEST = '''"""Tests whether {name} stands and moves as it should; run it with pytest, here."""
+
+from layouts import single
+from robots import RobotRegistry
+from robot_layouts.simulation.checks.grasp import try_grasps
+from robot_layouts.simulation.checks.tcp_control import try_tcp_control
+from robot_layouts.simulation.checks.trial import try_robot
+from {module} import {constant}
+
+
+def test_it_goes_by_its_name():
+    assert RobotRegistry.load({name!r}) == {constant}
+
+
+def test_nothing_collides_where_it_stands():
+    report = single({{"arm": {constant}}}).validate(workspaces=False)
+    assert report.ok, str(report)
+
+
+def test_every_action_number_moves_its_own_joints():
+    assert not try_robot({constant}).problems
+
+
+def test_its_tcp_goes_where_it_is_sent():
+    if {constant}.arm_joints:
+        assert [seen.problem for seen in try_tcp_control({constant}) if seen.problem] == []
+
+
+def test_its_fingers_meet_at_the_tcp_and_hold_a_cube():
+    assert [seen.problem for seen in try_grasps({constant}) if seen.problem] == []
+'''
 
 
 def guess_descriptor(
@@ -167,43 +201,6 @@ def _described(name: str, form: str | None) -> Path:
     if path is None:
         raise AssetError(f"{name} of robot_descriptions is a xacro template, not a URDF")
     return Path(path)
-
-
-_REGISTERED = """
-RobotRegistry.register({constant})  # from here on, it goes by its name: {name!r}
-"""
-
-_TEST = '''"""Tests whether {name} stands and moves as it should; run it with pytest, here."""
-
-from layouts import single
-from robots import RobotRegistry
-from robot_layouts.simulation.checks.grasp import try_grasps
-from robot_layouts.simulation.checks.tcp_control import try_tcp_control
-from robot_layouts.simulation.checks.trial import try_robot
-from {module} import {constant}
-
-
-def test_it_goes_by_its_name():
-    assert RobotRegistry.load({name!r}) == {constant}
-
-
-def test_nothing_collides_where_it_stands():
-    report = single({{"arm": {constant}}}).validate(workspaces=False)
-    assert report.ok, str(report)
-
-
-def test_every_action_number_moves_its_own_joints():
-    assert not try_robot({constant}).problems
-
-
-def test_its_tcp_goes_where_it_is_sent():
-    if {constant}.arm_joints:
-        assert [seen.problem for seen in try_tcp_control({constant}) if seen.problem] == []
-
-
-def test_its_fingers_meet_at_the_tcp_and_hold_a_cube():
-    assert [seen.problem for seen in try_grasps({constant}) if seen.problem] == []
-'''
 
 
 def new_robot(

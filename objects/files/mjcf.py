@@ -14,7 +14,9 @@ from objects.descriptor import Grasp, NamedPoint, ObjectDescriptor
 from objects.family import Made
 from objects.files.convex import few_corners, rounded
 from objects.files.grasps import MOST, proposed
-from objects.files.mesh import UNKNOWN, UPRIGHT, Files, identifier, remembered, resting
+from objects.files.mesh import UNKNOWN, identifier
+from objects.files.remembering import Files, remembered
+from objects.files.rests import UPRIGHT, resting
 from objects.joints import Joint
 from objects.shapes import (
     MOST_CORNERS,

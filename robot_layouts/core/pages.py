@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from html import escape
 
 COMMON = "robot_layouts.core"
+_CELL = ' style="text-align: left; padding: 0 1em 0 0"'
 
 
 class Tile(NamedTuple):
@@ -113,9 +114,6 @@ def data_address(kind: str, content: bytes) -> str:
 def plural(count: int, word: str) -> str:
     """Return a number of things, in words."""
     return f"{count:,} {word}" + ("" if count == 1 else "s")
-
-
-_CELL = ' style="text-align: left; padding: 0 1em 0 0"'
 
 
 def heading(title: str, text: str) -> str:

@@ -31,6 +31,11 @@ MOST_MOMENTS = 10_000_000  # besides those between near bodies; that many take m
 FINEST = 1e-5  # m; bodies that come nearer by no more than that between two moments are ignored
 ROUNDING = 1e-5  # m; of distances that FCL finds by iteration
 SPARSE = 0.02  # m; how far bodies travel between moments at which clearances are measured
+SMALLEST = 1e-6  # m, rad; of steps between moments
+TOLERANCE = 0.01  # share of a limit of velocity or acceleration that is rounding
+BEYOND = 1e-4  # rad, m: so far beyond a joint limit is rounding
+MEASURED = 100  # moments at most at which the depth of overlaps is measured, which takes long
+REACHES = 3  # moments around which the least clearance is looked for once more
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,13 +186,6 @@ def _cut(ways: Intervals, pieces: Floats) -> tuple[Floats, Floats]:
     ends = np.append(starts[1:], starts[-1:])
     ends[last] = ways.ends
     return starts, ends
-
-
-SMALLEST = 1e-6  # m, rad; of steps between moments
-TOLERANCE = 0.01  # share of a limit of velocity or acceleration that is rounding
-BEYOND = 1e-4  # rad, m: so far beyond a joint limit is rounding
-MEASURED = 100  # moments at most at which the depth of overlaps is measured, which takes long
-REACHES = 3  # moments around which the least clearance is looked for once more
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,21 @@ from robots import SimulationError, UnknownNameError
 from robots.assets.locator import GROUND_TEXTURE, TABLE
 from robots.descriptor import IDENTITY, Quaternion, Vector3
 
+# mani_skill 3.0.1, utils/scene_builder/table/scene_builder.py (m)
+TABLE_HEIGHT = 0.9196429
+TABLE_HALF_SIZE = (2.418 / 2, 1.209 / 2, TABLE_HEIGHT / 2)
+TABLE_POSITION = (-0.12, 0.0, -TABLE_HEIGHT)
+TABLE_QUATERNION = (cos(pi / 4), 0.0, 0.0, sin(pi / 4))  # the long side along y
+TABLE_OUTLINE = (  # x_min, y_min, x_max, y_max (m)
+    TABLE_POSITION[0] - TABLE_HALF_SIZE[1],
+    -TABLE_HALF_SIZE[0],
+    TABLE_POSITION[0] + TABLE_HALF_SIZE[1],
+    TABLE_HALF_SIZE[0],
+)
+GROUND_HEIGHT = -(3.5762787e-07 + 0.91964257)  # from the table mesh's bounding box
+TABLE_MESH_SCALE = 1.75
+WHITE = (1.0, 1.0, 1.0, 1.0)
+
 
 class Part(NamedTuple):
     """A link of a robot, or a body of its own.
@@ -329,24 +344,6 @@ class World:
         )
 
 
-# mani_skill 3.0.1, utils/scene_builder/table/scene_builder.py (m)
-TABLE_HEIGHT = 0.9196429
-TABLE_HALF_SIZE = (2.418 / 2, 1.209 / 2, TABLE_HEIGHT / 2)
-TABLE_POSITION = (-0.12, 0.0, -TABLE_HEIGHT)
-TABLE_QUATERNION = (cos(pi / 4), 0.0, 0.0, sin(pi / 4))  # the long side along y
-TABLE_OUTLINE = (  # x_min, y_min, x_max, y_max (m)
-    TABLE_POSITION[0] - TABLE_HALF_SIZE[1],
-    -TABLE_HALF_SIZE[0],
-    TABLE_POSITION[0] + TABLE_HALF_SIZE[1],
-    TABLE_HALF_SIZE[0],
-)
-GROUND_HEIGHT = -(3.5762787e-07 + 0.91964257)  # from the table mesh's bounding box
-
-
-MESH_SCALE = 1.75
-WHITE = (1.0, 1.0, 1.0, 1.0)
-
-
 def add_table(world: World, *, textured: bool = True) -> None:
     """Add the table (a kinematic body called ``table-workspace``) and the ground.
 
@@ -387,7 +384,7 @@ def add_table(world: World, *, textured: bool = True) -> None:
 def _table_mesh(*, textured: bool) -> tuple[Shape]:
     mesh = Mesh(
         file=TABLE.locate(),
-        scale=(MESH_SCALE, MESH_SCALE, MESH_SCALE),
+        scale=(TABLE_MESH_SCALE, TABLE_MESH_SCALE, TABLE_MESH_SCALE),
         quaternion=TABLE_QUATERNION,
         textured=textured,
         color=WHITE,

@@ -8,6 +8,9 @@ from pathlib import Path
 
 from robot_layouts.core.paths import absolute
 
+# What stands around robots in pictures; physics needs none of it.
+SCENERY = "maniskill_tabletop"  # a package of the manifest
+
 
 @dataclass(frozen=True)
 class UrdfLocator:
@@ -107,7 +110,5 @@ def opened_path(path: str | os.PathLike[str], folder: str | os.PathLike[str] | N
     return file
 
 
-# What stands around robots in pictures; physics needs none of it.
-SCENERY = "maniskill_tabletop"  # a package of the manifest
 TABLE = FileLocator(SCENERY, "scene_builder/table/assets/table.glb")
 GROUND_TEXTURE = FileLocator(SCENERY, "building/assets/grid_texture.png")

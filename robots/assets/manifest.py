@@ -16,6 +16,8 @@ from robot_layouts.core.errors import AssetError, UnknownNameError, UnreadableFi
 from robot_layouts.core.files import read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
 
+_LARGEST_MANIFEST = 2**24  # bytes
+
 
 class SourceError(AssetError):
     """Why one source could not give every file it was asked for."""
@@ -80,9 +82,6 @@ def find_package(name: str) -> Path:
         return Path(str(metadata.distribution(name).locate_file("")))
     except metadata.PackageNotFoundError:
         raise SourceError(f"{name} is not installed") from None
-
-
-_LARGEST_MANIFEST = 2**24  # bytes
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,7 @@ _BAD_ARCHIVE = (
 
 # One byte more than a file may have shows that it is too large; no more is read.
 Contents = Iterator[tuple[AssetFile, bytes]]
+ENDPOINT_VARIABLE = "HF_ENDPOINT"
 
 
 class AssetSource(Protocol):
@@ -363,9 +364,6 @@ def _expect_none(absent: Sequence[str]) -> None:
     """
     if absent:
         raise SourceError(f"lacks {len(absent)} files: {listing(absent)}")
-
-
-ENDPOINT_VARIABLE = "HF_ENDPOINT"
 
 
 def silent_bar() -> type[Any]:

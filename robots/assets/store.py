@@ -21,6 +21,13 @@ from robot_layouts.core.paths import ROOT_VARIABLE
 from robot_layouts.core.writing import remove, written_whole
 from robots.assets.manifest import AssetFile
 
+_LOCK, _PARTIAL = ".lock", ".partial"
+_ABSENT = (errno.ENOENT, errno.ENOTDIR)
+_EXCHANGEABLE = (errno.EINVAL, errno.EFBIG, errno.ELOOP)  # no regular file, too large, a loop
+_WAIT_BEFORE_SAYING = 2.0  # s
+# sha256 of files hashed by this process, with what tells that a file has changed since.
+_hashed: dict[Path, tuple[tuple[int, ...], str]] = {}
+
 
 def say(text: str) -> None:
     """Print one line; no name in it steers the terminal."""
@@ -38,15 +45,6 @@ def listing(entries: Sequence[str], separator: str = ", ", most: int = 12) -> st
     if len(entries) > most:
         shown.append(f"and {len(entries) - most} more")
     return separator.join(shown)
-
-
-_LOCK, _PARTIAL = ".lock", ".partial"
-_ABSENT = (errno.ENOENT, errno.ENOTDIR)
-_EXCHANGEABLE = (errno.EINVAL, errno.EFBIG, errno.ELOOP)  # no regular file, too large, a loop
-_WAIT_BEFORE_SAYING = 2.0  # s
-
-# sha256 of files hashed by this process, with what tells that a file has changed since.
-_hashed: dict[Path, tuple[tuple[int, ...], str]] = {}
 
 
 class FileState(Enum):

@@ -26,6 +26,8 @@ ALWAYS = 0.95  # of them; what MoveIt's setup assistant takes for always
 MOSTLY = 2 / 3
 PARALLEL = 0.999  # cosine; of slides that are one telescope
 MARGIN = 0.05  # m; more than the distance from which PhysX looks at a pair
+NEAR_ENOUGH = 1e-9  # m; of a face of the bodies' difference
+MOST_POINTS = 500  # of the polytope that grows within it
 
 
 def guess_allowed(
@@ -225,9 +227,6 @@ def _moving_between(one: str, other: str, model: UrdfModel) -> list[ModelJoint]:
     path = (*reversed(up[shared:]), *down[shared:])
     return [joint for joint in path if joint.moves]
 
-
-NEAR_ENOUGH = 1e-9  # m; of a face of the bodies' difference
-MOST_POINTS = 500  # of the polytope that grows within it
 
 _FIRST = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], float)
 

@@ -42,6 +42,19 @@ from robots import RobotLayoutsError, TaskError
 from tasks import get_task_class
 from tasks.registry import TASKS, make_scenario
 
+PAGE, TABLES, RUNS = "index.html", "report.md", "runs"  # in the folder
+STYLE = ("robot_layouts.data.suite", "suite.css")
+PLAYED = (
+    "Of each receipt some episodes, drawn at random, were played again for this page, and every"
+    " state and file was as it says. The commands play all of them, in the folder of this page."
+)
+UNPLAYED = (
+    "The policies of these receipts are programs of others, which this page did not run: nothing of"
+    " what they say was verified here. Where the program is, the commands play the episodes again."
+)
+WRONG = "These were played again or read, and are not what they say."
+_WIDTH, _ROW = 160, 12  # of a chart of intervals
+
 
 @dataclass(frozen=True)
 class RunClip:
@@ -145,21 +158,6 @@ def _film(receipt: Receipt, case: Case, episode: EpisodeReceipt) -> tuple[bytes,
         if trace_of(played.states).states != episode.states:
             return None
         return film_one(env, played)
-
-
-PAGE, TABLES, RUNS = "index.html", "report.md", "runs"  # in the folder
-STYLE = ("robot_layouts.data.suite", "suite.css")
-PLAYED = (
-    "Of each receipt some episodes, drawn at random, were played again for this page, and every"
-    " state and file was as it says. The commands play all of them, in the folder of this page."
-)
-UNPLAYED = (
-    "The policies of these receipts are programs of others, which this page did not run: nothing of"
-    " what they say was verified here. Where the program is, the commands play the episodes again."
-)
-WRONG = "These were played again or read, and are not what they say."
-
-_WIDTH, _ROW = 160, 12  # of a chart of intervals
 
 
 def named_apart(checked: Sequence[CheckedRun]) -> list[CheckedRun]:

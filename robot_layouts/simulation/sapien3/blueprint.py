@@ -40,6 +40,7 @@ BITS = 32  # of word 2
 USUAL = (1, 1)
 FLOOR = (1, 0)
 NO_FLOOR_CONTACT = (3, 2)
+MOST_PAIRS = 31  # that SAPIEN's URDF loader, and so native, keeps apart: a bit each
 
 
 def overlap_words(descriptor: RobotDescriptor, model: UrdfModel, urdf: Path) -> dict[str, int]:
@@ -112,9 +113,6 @@ def _shared(pair: LinkPair, partners: dict[str, set[str]]) -> int:
 
 def _gain(link: str, clique: set[str], waiting: set[LinkPair]) -> int:
     return sum(frozenset((link, other)) in waiting for other in clique)
-
-
-MOST_PAIRS = 31  # that SAPIEN's URDF loader, and so native, keeps apart: a bit each
 
 
 @dataclass

@@ -70,10 +70,10 @@ def fill_ends(root: Element, urdf: str) -> Iterator[str]:
     first = _first_rigid(root)
     solid = {first[name] for name, link in links.items() if link.find("collision") is not None}
     carriers = {end: first.get(link_of(joint, "parent"), "") for end, joint in moving.items()}
-    found: set[str] = set()
+    carrying, found = {*carriers.values()}, set[str]()
     for end, carrier in carriers.items():
         bare = [end] if carrier in solid else [end, carrier]
-        last = end not in carriers.values() and moving[end].get("type") != "continuous"
+        last = end not in carrying and moving[end].get("type") != "continuous"
         if last and end not in solid and carriers.get(bare[-1]) in solid:
             found |= {*bare}
     for name, link in links.items():
@@ -88,11 +88,17 @@ def fill_ends(root: Element, urdf: str) -> Iterator[str]:
 
 def _first_rigid(root: Element) -> dict[str, str]:
     """Return for each link the first one that is rigid with it, seen from the root."""
-    fixed = [joint for joint in root.iterfind("joint") if joint.get("type") == "fixed"]
-    first = {link.get("name", ""): link.get("name", "") for link in root.iterfind("link")}
-    for _ in fixed:  # each may stand before the one that carries it
-        for joint in fixed:
-            first[link_of(joint, "child")] = first.get(link_of(joint, "parent"), "")
+    names = dict.fromkeys(link.get("name", "") for link in root.iterfind("link"))
+    fixed = (joint for joint in root.iterfind("joint") if joint.get("type") == "fixed")
+    above = {link_of(joint, "child"): link_of(joint, "parent") for joint in fixed}
+    first: dict[str, str] = {}
+    for name in names:
+        way, last, up = dict[str, None](), name, name
+        while up in names and up not in way and up not in first:
+            way[up] = None
+            last, up = up, above.get(up, "")
+        if way:
+            first |= dict.fromkeys(way, first.get(up, last))
     return first
 
 
