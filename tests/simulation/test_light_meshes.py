@@ -50,11 +50,18 @@ def bumpy(tmp_path, name="bumpy.ply") -> Path:
     return path
 
 
-def farthest(points_of, surface) -> float:
-    """Return the distance (m) of points of one mesh from another, by trimesh's own search."""
+def far(points_of, surface) -> np.ndarray:
+    """Return points of one mesh that are 1 mm from another, by trimesh's own search."""
     sampled = trimesh.sample.sample_surface(points_of, 1500, seed=7)[0]
     points = np.concatenate([sampled, points_of.vertices[::3]])
-    return float(trimesh.proximity.closest_point(surface, points)[1].max())
+    return points[trimesh.proximity.closest_point(surface, points)[1] > 1e-3]
+
+
+def are_inside(points, surface) -> bool:
+    """Tell whether a ray from any of the points, in whichever of 500 directions, hits a mesh."""
+    ways = trimesh.sample.sample_surface(trimesh.creation.icosphere(4), 500, seed=7)[0]
+    starts = np.repeat(points, len(ways), axis=0) + 1e-5 * np.tile(ways, (len(points), 1))
+    return bool(surface.ray.intersects_any(starts, np.tile(ways, (len(points), 1))).all())
 
 
 @pytest.mark.long
@@ -66,14 +73,31 @@ def test_no_point_is_1_mm_away(made_here, link):
     whole = RenderShapeTriangleMesh(path, [1, 1, 1], None).parts
     parts = light_meshes.light_parts(path, (1.0, 1.0, 1.0))
     assert len(parts) == len(whole)
+    everything = trimesh.util.concatenate(
+        [trimesh.Trimesh(own.vertices, own.triangles, process=False) for own in whole]
+    )
     for part, own in zip(parts, whole, strict=True):
         before = trimesh.Trimesh(own.vertices, own.triangles, process=False)
         now = trimesh.load_mesh(part.file, process=False)
         assert len(now.faces) < len(before.faces) / 1.5
-        assert farthest(now, before) < 1e-3
-        assert farthest(before, now) < 1e-3
+        assert not len(far(now, before))
+        assert are_inside(far(before, now), everything)
         for name in ("base_color", "metallic", "roughness", "specular"):
             assert getattr(part.material(), name) == getattr(own.material, name)
+
+
+@pytest.mark.long
+def test_what_is_inside_is_left_out(made_here, tmp_path):
+    """Unless there is an opening through which it is seen."""
+    shell = trimesh.creation.icosphere(4, 0.05)
+    opened = shell.submesh([np.flatnonzero(shell.triangles_center[:, 2] < 0.045)], append=True)
+    for outside, few in ((shell, True), (opened, False)):
+        inside = trimesh.creation.icosphere(4, 0.03)
+        path = tmp_path / f"{few}.ply"
+        trimesh.util.concatenate([outside, inside]).export(path)
+        (part,) = light_meshes.light_parts(str(path), (1.0, 1.0, 1.0))
+        reach = np.linalg.norm(trimesh.load_mesh(part.file, process=False).vertices, axis=1)
+        assert (reach.min() > 0.04) == few
 
 
 @pytest.mark.long

@@ -27,10 +27,14 @@ from robots.assets.assembled import write_folder
 from robots.assets.store import say
 from robots.urdf.mesh_files import MAX_MESH_BYTES
 
-DEVIATION = 0.5e-3  # m
+DEVIATION = 0.75e-3  # m
 _FOLDER = "light_meshes"
-_METHOD = 1  # to be raised when other meshes are made
-_REMOVED = (0.995, 0.98, 0.95, 0.9, 0.8, 0.6)  # shares of triangles that may go
+_METHOD = 2  # to be raised when other meshes are made
+_REMOVED = (0.6, 0.8, 0.9, 0.95, 0.98, 0.995)  # shares of triangles that may go
+_GAIN = 0.97  # of a piece's triangles; if fewer removed leave more than that, no more are tried
+_OPENING = 1e-3  # m; narrower ones show nothing of what is behind them
+_MOST_CELLS = 2**25  # of that size, in which hidden triangles are looked for
+_IN_CELL = 20  # points for each cell that a surface crosses: so many that none is left without
 _FEW = 200  # triangles of a connected piece, which stays as it is
 _WORTH = 0.8  # of a file's triangles; if more would be left, it is drawn as it is
 _UNIT = 1e-3  # m; the decimation's thresholds are made for millimetres
@@ -111,7 +115,8 @@ def _made(path: str, scale: Floats) -> dict[str, bytes]:
     say(f"making a lighter mesh of {Path(path).name} for pictures, once")
     shape: Any = RenderShapeTriangleMesh(path, [1.0, 1.0, 1.0], None)
     before = sum(len(part.triangles) for part in shape.parts)
-    made = [] if _has_textures(shape) else [_light(part, scale) for part in shape.parts]
+    own = [] if _has_textures(shape) else [_welded(part, scale) for part in shape.parts]
+    made = [_light(part) for part in _seen(own)]
     kept: list[Any] = []
     files: dict[str, bytes] = {}
     if made and sum(len(faces) for _, faces in made) <= _WORTH * before:
@@ -132,21 +137,56 @@ def _has_textures(shape: Any) -> bool:
     return any(getattr(m, f"{name}_texture") for m in materials for name in TEXTURES)
 
 
-def _light(part: Any, scale: Floats) -> Surface:
-    """Return corners (m) and triangles of a part, its connected pieces one after the other."""
+def _welded(part: Any, scale: Floats) -> Surface:
+    """Return a part's corners (m), each once, and its triangles."""
     own = np.asarray(part.vertices, np.float64) * scale
     corners, place = np.unique(own, axis=0, return_inverse=True)
     faces = place.reshape(-1)[np.asarray(part.triangles, np.int64)]
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
-    if scale.prod() < 0:
-        faces = faces[:, ::-1]
-    made = [_decimated(piece) for piece in _pieces(corners, faces)]
-    starts = np.cumsum([0, *(len(piece) for piece, _ in made)])
-    joined = [own + start for (_, own), start in zip(made, starts[:-1], strict=True)]
-    empty = np.zeros((0, 3))
-    return np.concatenate([empty, *(piece for piece, _ in made)]), np.concatenate(
-        [empty.astype(np.int64), *joined]
-    )
+    return corners, faces[:, ::-1] if scale.prod() < 0 else faces
+
+
+def _joined(pieces: Sequence[Surface]) -> Surface:
+    """Return the corners and triangles of all pieces, one after the other."""
+    starts = np.cumsum([0, *(len(corners) for corners, _ in pieces)])
+    faces = [own + start for (_, own), start in zip(pieces, starts[:-1], strict=True)]
+    empty = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    corners = [corners for corners, _ in pieces]
+    return np.concatenate([empty[0], *corners]), np.concatenate([empty[1], *faces])
+
+
+def _seen(parts: Sequence[Surface]) -> list[Surface]:
+    """Return parts without the triangles inside of them, which nobody sees.
+
+    Space is divided into cells of `_OPENING`. Those that no surface crosses are outside, if they
+    are connected with what is around all parts; a triangle is seen that crosses a cell beside one.
+    """
+    import trimesh
+    from scipy import ndimage
+
+    corners, faces = _joined(parts)
+    size = np.ceil(np.ptp(corners, axis=0) / _OPENING) + 3 if len(faces) else np.array([np.inf])
+    if size.prod() > _MOST_CELLS:
+        return list(parts)
+    whole = trimesh.Trimesh(corners, faces, process=False)
+    between, on = _sampled(whole, (1, _MOST_CELLS, _OPENING**2 / _IN_CELL))
+    points = np.concatenate([between, whole.triangles_center, *np.moveaxis(whole.triangles, 1, 0)])
+    on = np.concatenate([on, np.tile(np.arange(len(faces)), 4)])
+    x, y, z = ((points - corners.min(0)) / _OPENING + 1).astype(np.int64).T
+    crossed = np.zeros(size.astype(np.int64), bool)
+    crossed[x, y, z] = True
+    around: Any = ndimage.label(~crossed)
+    outside = around[0] == around[0][0, 0, 0]
+    beside: Any = ndimage.binary_dilation(outside, np.ones((3, 3, 3), bool))
+    shown = np.zeros(len(faces), bool)
+    shown[on[beside[x, y, z]]] = True
+    ends = np.cumsum([len(own) for _, own in parts])[:-1]
+    return [(c, own[s]) for (c, own), s in zip(parts, np.split(shown, ends), strict=True)]
+
+
+def _light(part: Surface) -> Surface:
+    """Return a part with fewer triangles, its connected pieces one after the other."""
+    return _joined([_decimated(piece) for piece in _pieces(*part)])
 
 
 def _pieces(corners: Floats, faces: Faces) -> Iterator[Surface]:
@@ -160,8 +200,13 @@ def _pieces(corners: Floats, faces: Faces) -> Iterator[Surface]:
     of_face = label[faces[:, 0]]
     order = np.argsort(of_face, kind="stable")
     for rows in np.split(faces[order], np.flatnonzero(np.diff(of_face[order])) + 1):
-        used, place = np.unique(rows, return_inverse=True)
-        yield corners[used], place.reshape(-1, 3)
+        yield _used(corners, rows)
+
+
+def _used(corners: Floats, faces: Faces) -> Surface:
+    """Return triangles, and of the corners those that are theirs."""
+    used, place = np.unique(faces, return_inverse=True)
+    return corners[used], place.reshape(-1, 3)
 
 
 def _decimated(whole: Surface) -> Surface:
@@ -176,63 +221,102 @@ def _decimated(whole: Surface) -> Surface:
     for share in _REMOVED:
         found: Any = simplify(scaled, numbers, share)
         lighter = found[0].astype(np.float64) * _UNIT, found[1].astype(np.int64)
-        if len(lighter[1]) >= len(best[1]):
+        if not len(lighter[1]):
             break
-        corrected = _corrected(lighter, whole)
-        if len(corrected[1]) < len(best[1]):
-            best = corrected
+        corrected = _corrected(lighter, best, whole)
+        if len(corrected[1]) > _GAIN * len(best[1]):
+            break
+        best = corrected
     return best
 
 
-def _corrected(lighter: Surface, whole: Surface) -> Surface:
-    """Return a lighter surface with what is too far from the whole one replaced by that."""
-    if not len(lighter[1]):
-        return whole
-    right = _away(lighter, whole) <= DEVIATION
-    lost = whole[1][_away(whole, lighter, right) > DEVIATION]
-    faces = np.concatenate([lighter[1][right], lost + len(lighter[0])])
-    return np.concatenate([lighter[0], whole[0]]), faces
+def _corrected(lighter: Surface, best: Surface, whole: Surface) -> Surface:
+    """Return a lighter surface with what is too far from the whole one taken from the best one."""
+    near, gap, on = _nearest(lighter, whole)
+    right = _of_triangles(gap, on, lighter) <= DEVIATION
+    lost = _away(whole, lighter, right) > DEVIATION
+    corner = np.isin(np.arange(len(lighter[0])), lighter[1][~right])
+    lost[near[np.concatenate([~right, corner, ~right[on]])]] = True  # where wrong ones go
+    back = lost if best is whole else _standing_for(lost, whole, best)
+    faces = np.concatenate([lighter[1][right], best[1][back] + len(lighter[0])])
+    return _used(np.concatenate([lighter[0], best[0]]), faces)
+
+
+def _standing_for(lost: NDArray[np.bool_], whole: Surface, best: Surface) -> NDArray[np.bool_]:
+    """Return which triangles of the best surface are where some of the whole one are, (T,)."""
+    near, _, on = _nearest(best, whole)
+    there = _of_triangles(lost[near], on, best)
+    if lost.any():
+        there[_nearest(_used(whole[0], whole[1][lost]), best)[0]] = True
+    return there
 
 
 def _away(surface: Surface, other: Surface, right: NDArray[np.bool_] | None = None) -> Floats:
     """Return how far each triangle of a surface is from another surface, (T,) (m).
 
-    That of its corners, its middle, and of points on it; of each, the distance is that to the
-    nearest of some triangles, so that it is never taken for too small. Infinity if no triangle
-    near its middle faces the same way, as it is drawn from one side only.
+    That of its corners, its middle, and of points on it.
 
     Args:
         surface: The surface.
         other: The other one.
-        right: Which triangles of the other one count, (T,); nearest to another one is infinity.
+        right: Which triangles of the other one count, (T,).
+    """
+    _, gap, on = _nearest(surface, other, right)
+    return _of_triangles(gap, on, surface)
+
+
+def _of_triangles(values: NDArray[Any], on: NDArray[np.int64], surface: Surface) -> NDArray[Any]:
+    """Return of each triangle the largest of the values of its points, which `_nearest` chose."""
+    middles, corners, between = np.split(values, np.cumsum([len(surface[1]), len(surface[0])]))
+    largest = np.maximum(middles, corners[surface[1]].max(1))
+    np.maximum.at(largest, on, between)
+    return largest
+
+
+def _nearest(
+    surface: Surface, other: Surface, right: NDArray[np.bool_] | None = None
+) -> tuple[NDArray[np.int64], Floats, NDArray[np.int64]]:
+    """Return where another surface is nearest to points of a surface.
+
+    Args:
+        surface: The surface.
+        other: The other one.
+        right: Which triangles of the other one count, (T,).
+
+    Returns:
+        For the middles of all triangles, all corners and points between them, the nearest triangle
+        of the other surface, (P,), and how far it is, (P,) (m): to the nearest of some, so that it
+        is never taken for too small. That of a middle faces the same way, as it is drawn from one
+        side only; infinity if none of these does. Then on which triangles the points between are,
+        (B,).
     """
     import trimesh
     from scipy.spatial import KDTree
 
     own, mesh = (trimesh.Trimesh(*each, process=False) for each in (surface, other))
+    across = np.cross(*_sides(other))
     between, on = _sampled(own, _POINTS)
-    points = np.concatenate([own.triangles_center, between, surface[0]])
+    points = np.concatenate([own.triangles_center, surface[0], between])
+    upright = np.zeros((len(points), 3))
+    upright[: len(surface[1])] = np.cross(*_sides(surface))
     places, triangle = _sampled(mesh, _PLACES)
     places = np.concatenate([places, mesh.triangles_center])
     triangle = np.concatenate([triangle, np.arange(len(mesh.faces))])
     near: Any = KDTree(places).query(points, _NEAREST)[1]
     near = triangle[np.minimum(near, len(triangle) - 1)]
-    gaps = np.empty(near.shape)
+    found, gap = np.empty(len(points), np.int64), np.empty(len(points))
     for start in range(0, len(points), _TOGETHER):
         block = slice(start, start + _TOGETHER)
         corners = mesh.triangles[near[block]].reshape(-1, 3, 3)
         repeated = points[block].repeat(_NEAREST, axis=0)
         closest: Any = trimesh.triangles.closest_point(corners, repeated)
-        gaps[block] = np.linalg.norm(closest - repeated, axis=1).reshape(-1, _NEAREST)
-    nearest, count = gaps.min(1), len(surface[1])
-    if right is not None:
-        nearest[~right[near[np.arange(len(gaps)), gaps.argmin(1)]]] = np.inf
-    away = np.maximum(nearest[:count], nearest[count + len(between) :][surface[1]].max(1))
-    np.maximum.at(away, on, nearest[count : count + len(between)])
-    across = np.cross(*_sides(surface)), np.cross(*_sides(other))
-    alike = (across[0][:, None] * across[1][near[:count]]).sum(2) >= 0
-    away[~(alike & (gaps[:count] <= DEVIATION)).any(1)] = np.inf
-    return away
+        gaps = np.linalg.norm(closest - repeated, axis=1).reshape(-1, _NEAREST)
+        alike = (upright[block][:, None] * across[near[block]]).sum(2) >= 0
+        gaps[~(alike if right is None else alike & right[near[block]])] = np.inf
+        first = gaps.argmin(1)
+        rows = np.arange(len(first))
+        found[block], gap[block] = near[block][rows, first], gaps[rows, first]
+    return found, gap, on
 
 
 def _sides(surface: Surface) -> tuple[Floats, Floats]:
@@ -254,36 +338,40 @@ def _sampled(mesh: Any, limits: tuple[int, int, float]) -> tuple[Floats, NDArray
 def _ply(corners: Floats, faces: Faces) -> bytes:
     """Return a mesh as a file, with normals: smooth but where faces meet at an edge."""
     import trimesh
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
     across = np.cross(*_sides((corners, faces)))
-    length = np.linalg.norm(across, axis=1, keepdims=True)
-    upright = across / np.where(length > 0, length, 1)
-    first, second = _sharing(faces.reshape(-1))
-    face, beside = first // 3, second // 3
-    alike = (upright[face] * upright[beside]).sum(1) > _CREASE
-    normals = np.zeros((faces.size, 3))
-    np.add.at(normals, first[alike], across[beside[alike]])
+    one, other = _meeting(faces, across)
+    at = faces.reshape(-1)
+    links = coo_array((np.ones(len(one), bool), (one, other)), shape=(at.size,) * 2)
+    count, place = connected_components(links, directed=False)
+    normals, places = np.zeros((count, 3)), np.empty((count, 3))
+    np.add.at(normals, place, across.repeat(3, axis=0))
+    places[place] = corners[at]
     size = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(size > 0, normals / np.where(size > 0, size, 1), [[0.0, 0.0, 1.0]])
-    rows = np.column_stack([faces.reshape(-1), np.round(normals * 500)])
-    _, kept, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    mesh = trimesh.Trimesh(
-        corners[faces.reshape(-1)[kept]],
-        place.reshape(-1, 3),
-        vertex_normals=normals[kept],
-        process=False,
-    )
+    mesh = trimesh.Trimesh(places, place.reshape(-1, 3), vertex_normals=normals, process=False)
     contents: Any = mesh.export(file_type="ply", vertex_normal=True)
     return contents
 
 
-def _sharing(corner: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return all pairs of places at which the same corner stands, each with itself, too."""
-    order = np.argsort(corner, kind="stable")
-    count = np.bincount(corner)
-    start = np.cumsum(count) - count
-    many = count[corner[order]]  # of each place, in that order
-    first = np.repeat(order, many)
-    within = np.arange(len(first)) - np.repeat(np.cumsum(many) - many, many)
-    second = order[np.repeat(start[corner[order]], many) + within]
-    return first, second
+def _meeting(faces: Faces, across: Floats) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the places in `faces`, flat, at which triangles meet that are shaded as one surface.
+
+    Args:
+        faces: The triangles.
+        across: A vector along the normal of each, (T, 3).
+    """
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    upright = across / np.where(length > 0, length, 1)
+    start = np.arange(faces.size)
+    sides = np.stack([start, np.roll(start.reshape(-1, 3), -1, axis=1).reshape(-1)], axis=1)
+    corners = faces.reshape(-1)[sides]
+    turned = corners[:, 0] > corners[:, 1]
+    sides[turned], corners[turned] = sides[turned, ::-1], corners[turned, ::-1]
+    order = np.lexsort(corners.T)
+    shared = (corners[order[1:]] == corners[order[:-1]]).all(1)
+    first, second = order[:-1][shared], order[1:][shared]
+    smooth = (upright[first // 3] * upright[second // 3]).sum(1) > _CREASE
+    return sides[first[smooth]].reshape(-1), sides[second[smooth]].reshape(-1)
