@@ -40,6 +40,7 @@ from robot_layouts.data.reading.recording import Recording, Trajectory
 from robot_layouts.kinematics.rotations import rotation_of
 from robots import RobotLayoutsError, TaskError
 from tasks import Cube, Normal, Randomization
+from tasks.cell_options import chosen_robots
 from tasks.driving import DrivenGroup, driven_groups
 from tasks.episode import moments
 
@@ -71,6 +72,7 @@ class Recipe:
         batch: Moments in a batch.
         learning_rate: At first, after 200 batches; it falls to 0.
         simulator: In which it learns.
+        robots: Others than the task's: one name for all places, or ``PLACE=ROBOT,…``.
     """
 
     task: str
@@ -85,17 +87,21 @@ class Recipe:
     batch: int = 256
     learning_rate: float = 1e-3
     simulator: str = "sapien3"
-    options: ClassVar[tuple[str, ...]] = ("simulator",)  # fields that the command line sets, too
+    robots: str = ""
+    options: ClassVar[tuple[str, ...]] = (  # fields that the command line sets, too
+        *("shake", "chunk", "played", "simulator", "robots"),
+    )
 
     @property
     def making(self) -> dict[str, Any]:
         """How the task is made that is recorded: arguments of `tasks.make`."""
-        return {"simulator": self.simulator}
+        others = {"robots": chosen_robots(self.robots.split(","))} if self.robots else {}
+        return {"simulator": self.simulator, **others}
 
 
 def shaking(recipe: Recipe) -> Randomization:
     """Return the noise that moves arms aside while the expert brings them back."""
-    env = tasks.make(recipe.task)
+    env = tasks.make(recipe.task, **recipe.making)
     env.close()
     groups = [f"{driven.robot}.{driven.name}" for driven in _arms(env.layout)]
     return Randomization(action_noise=dict.fromkeys(groups, Normal(recipe.shake)))

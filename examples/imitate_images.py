@@ -50,13 +50,14 @@ class PictureRecipe(Recipe):
     batch: int = 64
     size: int = 96
     visuals: str = "full"
-    options: ClassVar[tuple[str, ...]] = ("size", "visuals")
+    options: ClassVar[tuple[str, ...]] = (*Recipe.options, "size", "visuals")
 
     @property
     def making(self) -> dict[str, Any]:
         """How the task is made: arguments of `tasks.make`."""
         size = self.size, self.size
-        return {"obs_mode": OBSERVED, "camera_size": size, "visuals": self.visuals}
+        seen = {"obs_mode": OBSERVED, "camera_size": size, "visuals": self.visuals}
+        return {**super().making, **seen}
 
 
 @dataclass(frozen=True)

@@ -156,9 +156,10 @@ def test_what_the_page_of_experts_promises_of_pairs():
 
 def test_what_the_page_of_the_ladder_promises():
     seen = record("ladder")["tasks"]
-    assert sum(len(one["arms"]) >= 3 for one in seen.values()) >= 2
+    assert sum(len(one["arms"]) >= 3 for one in seen.values()) >= 4
     assert sum(not {"xarm7", "ur10"}.isdisjoint(one["arms"]) for one in seen.values()) >= 2
-    for task, one in seen.items():
+    for one in seen.values():
+        recipe = one["recipe"]
         for name, found in one["layouts"].items():
             receipt = Receipt.read(DOCS / "receipts" / "ladder" / found["receipt"])
             result = result_of(receipt.episodes)
@@ -168,9 +169,12 @@ def test_what_the_page_of_the_ladder_promises():
             assert (found["steps"], found["stage_score"]) == (result.length, result.stage_score)
             assert {*found["touching"]} <= {*tested}
             assert bool(receipt.making["randomization"]) == (name != OWN)
-            assert receipt.policy["name"] == "imitate:policy"
+            example = "imitate_images" if "size" in recipe else "imitate"
+            assert receipt.policy["name"] == f"{example}:policy"
             assert receipt.policy["files"]
-            assert receipt.task == describe_task(get_task_class(task))
+            assert receipt.task == describe_task(get_task_class(recipe["task"]))
+            robots = [place["robot"] for place in receipt.making["layout"].values()]
+            assert robots == one["arms"]
 
 
 def test_nothing_portable_differs():

@@ -7,13 +7,16 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 
 import pytest
 import torch
 
 pytest.importorskip("matplotlib")
 
+import tasks
 from robot_layouts.data import evaluate
+from robot_layouts.data.reading.recording import Recording
 from tests.examples.learning import EXAMPLES, ROOT, loaded
 
 EXAMPLE = EXAMPLES / "imitate.py"
@@ -90,6 +93,21 @@ def test_the_policy_plays_alike_alone_and_beside_others(example, learned):
     beside = evaluate(pickle.loads(pickle.dumps(policy)), TASK, range(50, 53), num_envs=3, **how)
     assert alone.scores == beside.scores
     assert policy.file == str(learned / "policy.pt")
+
+
+def test_it_learns_and_plays_with_other_robots(example, tmp_path):
+    words = ["--robots", "panda_wristcam", "--workers", "0", "--out", str(tmp_path)]
+    assert example.main([*WORDS, *words]) in (0, 1)
+    policy = example.ClonedPolicy.load(tmp_path / "policy.pt")
+    with closing(tasks.make(TASK, **policy.making)) as env:
+        assert [placement.robot.name for placement in env.layout.values()] == ["panda_wristcam"]
+    with (
+        Recording(tmp_path / "recording") as episodes,
+        closing(
+            tasks.make(TASK, randomization=example.shaking(policy.recipe), **policy.recipe.making)
+        ) as env,
+    ):
+        episodes.expect_world(env)
 
 
 def test_a_folder_of_another_recipe_is_refused(example, learned, recording, capsys):
