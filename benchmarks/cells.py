@@ -7,10 +7,9 @@ mixtures that were chosen.
 
 from __future__ import annotations
 
-import signal
 from collections import Counter
-from collections.abc import Collection, Generator, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import closing
 from itertools import cycle, permutations, product
 from pathlib import Path
 from random import Random
@@ -21,6 +20,7 @@ from tqdm import tqdm
 from benchmarks.records import (
     DOCS,
     Record,
+    patience,
     read_record,
     table,
     versions_of,
@@ -29,13 +29,13 @@ from benchmarks.records import (
 )
 from benchmarks.skills import robot_of
 from robot_layouts.experts import find_expert
-from robots import RobotLayoutsError, TaskError
+from robots import RobotLayoutsError
 from tasks import Needs, get_task_class, list_tasks, make
 from tasks.episode import play
 
 ROBOTS = ("so101", "xarm7", "xarm7_with_panda", "z1", "fetch", "ur10")
-PAIRED = ("so101", "xarm7", "panda", "z1", "ur5", "ur10")  # of which two makes are drawn
 PATIENCE = 150  # s that an expert may plan an episode
+PAIRED = ("so101", "xarm7", "panda", "z1", "ur5", "ur10")  # of which two makes are drawn
 MIXED = (
     ("CellPressTogether-v1", ("ur10", "panda", "xarm7")),
     ("CellGatherBlocks-v1", ("ur10", "panda_stick", "panda", "xarm7")),
@@ -163,7 +163,7 @@ def _played(task: str, seen: Record, seeds: int) -> Iterator[None]:
         seen["scale"] = round(env.task.fit.scale, 2)
         for seed in missing:
             try:
-                with _patience():
+                with patience(PATIENCE):
                     plan = find_expert(task)(env, int(seed))
                 solved = play(env, int(seed), plan).solved
                 seen["episodes"][seed] = (
@@ -172,22 +172,6 @@ def _played(task: str, seen: Record, seeds: int) -> Iterator[None]:
             except RobotLayoutsError as error:
                 seen["episodes"][seed] = _first_line(error).removeprefix("no plan: ")
             yield
-
-
-@contextmanager
-def _patience() -> Generator[None]:
-    """Interrupt what takes longer than `PATIENCE`, with a TaskError."""
-
-    def give_up(*_: object) -> None:
-        raise TaskError(f"no plan within {PATIENCE} s")
-
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.alarm(PATIENCE)
-    try:
-        yield
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def _first_line(error: RobotLayoutsError) -> str:

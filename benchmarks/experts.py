@@ -10,8 +10,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
-from itertools import chain, product
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import chain, cycle, product
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -23,6 +24,7 @@ from tqdm import tqdm
 from benchmarks.records import (
     DOCS,
     Record,
+    patience,
     read_record,
     versions_of,
     write_page,
@@ -31,10 +33,12 @@ from benchmarks.records import (
 from benchmarks.skills import robot_of
 from layouts import Layout, face_to_face, ring, search
 from layouts.frames import Frame
-from robot_layouts.experts import find_expert
+from robot_layouts.experts import find_expert, first_success
+from robot_layouts.experts.originals import two_robot_lift_bar as lifting
+from robot_layouts.experts.rehearsal import Plan
 from robot_layouts.experts.touching import ArmWatch
 from robots import LayoutError, RobotLayoutsError, TaskError
-from tasks import TaskEnv, get_task_class, make
+from tasks import TaskEnv, get_task_class, make, register_task
 from tasks.episode import play
 
 Area = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]  # x, y, z (m)
@@ -117,13 +121,18 @@ CELLS = {
 }
 TASKS = (*CELLS, "Relay-v1")
 
-HAND_OVER = "TwoRobotHandOver-v1"
 HANDS = (
     *("panda", "so100", "so101", "z1", "fetch"),
     *("xarm7_with_panda", "ur3_with_panda", "ur5_with_panda", "ur10_with_panda"),
 )
 PAIRS = tuple(dict.fromkeys(pair for hand in HANDS for pair in ((hand, hand), ("panda", hand))))
 BODIES = ("baxter", "mobile_panda_dual", "pr2", "tiago_pro")
+BAR = "TwoRobotLiftBar-v1"
+PAIRED = ("TwoRobotHandOver-v1", BAR, "Relay-v1")  # what pairs of robots do
+FITTING = "LiftBarThatFits-v1"  # the bar, as large as a pair holds and reaches
+BAR_STEPS = 300  # small arms move by 0.3 rad per second
+PATIENCE = 120  # s that an expert may plan an episode
+NEARER = 0.75  # of a reach: with grippers down, arms of a ring get less far
 
 
 def experts(
@@ -132,7 +141,8 @@ def experts(
     seeds: int = 100,
     layouts: int = 10,
     layout_seeds: int = 10,
-    pair_seeds: int = 10,
+    paired: tuple[str, ...] = PAIRED,
+    pair_seeds: int = 5,
     out: Path = DOCS / "experts.json",
 ) -> int:
     """Let experts of tasks for several robots play in their own layouts and in others.
@@ -142,7 +152,8 @@ def experts(
         seeds: In its own layout; those in the record are not played again.
         layouts: Other layouts.
         layout_seeds: In each of them.
-        pair_seeds: Of the hand-over by each pair of robots, face to face.
+        paired: Tasks that pairs of robots do.
+        pair_seeds: Of each of them, by each pair.
         out: The record, written after every episode; the page is beside it.
 
     Raises:
@@ -150,11 +161,12 @@ def experts(
     """
     torch.set_num_threads(1)
     record = read_record(out, versions={}, tasks={}, pairs={})
-    total = len(tasks) * (seeds + layouts * layout_seeds) + len((*PAIRS, *BODIES)) * pair_seeds
+    by_pairs = len(paired) * len((*PAIRS, *BODIES)) * pair_seeds
+    total = len(tasks) * (seeds + layouts * layout_seeds) + by_pairs
     with tqdm(total=total, disable=None) as bar:
         for _ in chain(
             _played(record, tasks, seeds, layouts, layout_seeds),
-            _handed_over(record["pairs"], pair_seeds),
+            *(_paired(task_id, record["pairs"], pair_seeds) for task_id in paired),
         ):
             record["versions"] |= versions_of("sapien", "ompl", "python-fcl")
             write_record(out, record)
@@ -162,10 +174,19 @@ def experts(
     shown = sorted(record["tasks"].items())
     rows = [row for task_id, seen in shown for row in _rows(task_id, seen)]
     failures = [line for task_id, seen in shown for line in _failures(task_id, seen)]
-    pairs = [[name, *_row([*seen["episodes"].values()])] for name, seen in record["pairs"].items()]
-    failures += [line for name, seen in record["pairs"].items() for line in _lacking(name, seen)]
+    failures += [
+        line
+        for task_id in PAIRED
+        for pair, seen in record["pairs"].get(task_id, {}).items()
+        for line in _lacking(task_id, pair, seen)
+    ]
     write_page(
-        out, "experts", versions=record["versions"], rows=rows, pairs=pairs, failures=failures
+        out,
+        "experts",
+        versions=record["versions"],
+        rows=rows,
+        pairs=_pairs(record["pairs"]),
+        failures=failures,
     )
     return 0
 
@@ -190,16 +211,17 @@ def _played(
                 yield from _play(task, other["episodes"], layout_seeds)
 
 
-def _handed_over(pairs: Record, seeds: int) -> Iterator[None]:
-    """Play what the record of pairs lacks, and yield after every episode."""
+def _paired(task_id: str, record: Record, seeds: int) -> Iterator[None]:
+    """Play what the record of pairs lacks of a task, and yield after every episode."""
+    pairs = record.setdefault(task_id, {})
     for names in (*PAIRS, *BODIES):
-        label = names if isinstance(names, str) else ", ".join(names)
-        seen = pairs.get(label, {"episodes": {}})
+        if isinstance(names, str) and task_id == "Relay-v1":  # no ring of three
+            continue
+        seen = pairs.setdefault(_label(names), {"episodes": {}})
         if len(seen["episodes"]) >= seeds or "error" in seen:
             continue
-        pairs[label] = seen
         try:
-            task = _standing(names)
+            task = standing(task_id, names)
         except RobotLayoutsError as error:
             seen["error"] = str(error).partition("\n")[0].rstrip(":")
             yield
@@ -207,16 +229,51 @@ def _handed_over(pairs: Record, seeds: int) -> Iterator[None]:
             yield from _play(task, seen["episodes"], seeds)
 
 
-def _standing(names: str | tuple[str, str]) -> TaskEnv:
-    """Return the hand-over by two robots face to face, or by the arms of one."""
+def _label(names: str | tuple[str, str]) -> str:
+    return names if isinstance(names, str) else ", ".join(names)
+
+
+def standing(task_id: str, names: str | tuple[str, str]) -> TaskEnv:
+    """Return a task of two robots, or of the arms of one.
+
+    Hand-overs are face to face at the preset's distance, a bar is lifted where the task's own
+    robots stand, as much nearer or farther as the pair reaches, and three take turns in a ring.
+    """
+    if task_id == BAR:
+        task_id = _bar()
     if isinstance(names, str):
-        return make(HAND_OVER, robots=names, obs_mode="none")
-    layout = face_to_face(dict(zip(("left", "right"), map(robot_of, names), strict=True)))
-    return make(HAND_OVER, layout=layout, obs_mode="none")
+        return make(task_id, robots=names, obs_mode="none")
+    robots = dict(zip(get_task_class(task_id).layout, map(robot_of, cycle(names)), strict=False))
+    if task_id == FITTING:
+        return make(task_id, robots=robots, obs_mode="none")
+    if task_id == "Relay-v1":
+        near = {place: replace(r, reach=NEARER * r.reach) for place, r in robots.items()}
+        layout = ring(near).replace_robots(**robots)
+    else:
+        layout = face_to_face(robots)
+    return make(task_id, layout=layout, obs_mode="none")
+
+
+@cache
+def _bar() -> str:
+    """Return the id of a task in which the bar, and the places it lies at, fit the robots."""
+    fields = {"__module__": __name__, "fits_robots": True, "max_episode_steps": BAR_STEPS}
+    register_task(FITTING)(type("LiftBarThatFits", (get_task_class(BAR),), fields))
+    return FITTING
+
+
+def lift_bar(task: TaskEnv, seed: int) -> Plan:
+    """Return the actions of the bar's expert, in the lengths in which the bar is declared."""
+    script = lifting._script  # pyright: ignore[reportPrivateUsage]
+    styles = lifting.STYLES
+    return first_success(
+        task, seed, lambda scene: [script(each, scene) for each in styles], as_declared=True
+    )
 
 
 def _play(task: TaskEnv, episodes: Record, seeds: int) -> Iterator[None]:
-    expert, arms = find_expert(task.task_id), ArmWatch(task)
+    expert = lift_bar if task.task_id == FITTING else find_expert(task.task_id)
+    arms = ArmWatch(task)
     with closing(task):
         for seed in range(seeds):
             if str(seed) not in episodes:
@@ -227,7 +284,8 @@ def _play(task: TaskEnv, episodes: Record, seeds: int) -> Iterator[None]:
 def _episode(task: TaskEnv, seed: int, expert: Any, arms: ArmWatch) -> Record:
     """Return whether an expert's plan succeeds, its steps, and which arms touched."""
     try:
-        plan = expert(task, seed)
+        with patience(PATIENCE):
+            plan = expert(task, seed)
     except TaskError as error:
         return {"success": False, "steps": 0, "touching": [], "reason": str(error)}
     touching: dict[str, None] = {}
@@ -311,12 +369,29 @@ def _row(episodes: Sequence[Record]) -> list[str]:
     ]
 
 
-def _lacking(pair: str, seen: Record) -> Iterator[str]:
-    """Yield why a pair does not hand over."""
+def _pairs(record: Record) -> list[list[str]]:
+    """Return a row for each pair of robots: what it solves of each task, and in how many steps."""
+    rows: list[list[str]] = []
+    for label in map(_label, (*PAIRS, *BODIES)):
+        row = [label]
+        touching = 0
+        for task_id in PAIRED:
+            seen = record.get(task_id, {}).get(label, {"episodes": {}})
+            episodes = [*seen["episodes"].values()]
+            solved = [episode["steps"] for episode in episodes if episode["success"]]
+            touching += sum(bool(episode["touching"]) for episode in episodes)
+            share = f"{len(solved)} of {len(episodes)}" if episodes else "–"
+            row += [share, f"{median(solved):.0f}" if solved else "–"]
+        rows.append([*row, str(touching)])
+    return rows
+
+
+def _lacking(task_id: str, pair: str, seen: Record) -> Iterator[str]:
+    """Yield why a pair does not solve a task."""
     reasons = Counter(e["reason"] for e in seen["episodes"].values() if not e["success"])
-    yield from (f"- {HAND_OVER} by {pair}: {n} × {why}" for why, n in reasons.items())
+    yield from (f"- {task_id} by {pair}: {n} × {why}" for why, n in reasons.items())
     if "error" in seen:
-        yield f"- {HAND_OVER} by {pair}: {seen['error']}"
+        yield f"- {task_id} by {pair}: {seen['error']}"
 
 
 def _failures(task_id: str, seen: Record) -> Iterator[str]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+import signal
+from collections.abc import Collection, Generator, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -13,7 +15,7 @@ from typing import Any
 import jinja2
 
 from robot_layouts.core.writing import write_whole
-from robots import RobotLayoutsError
+from robots import RobotLayoutsError, TaskError
 
 DOCS = Path(__file__).parents[1] / "docs"
 TEMPLATES = Path(__file__).with_name("pages")
@@ -95,6 +97,22 @@ def table(
     right = range(1, len(headings)) if numbers is None else numbers
     rule = ["---:" if column in right else "---" for column in range(len(headings))]
     return "\n".join(f"| {' | '.join(row)} |" for row in (headings, rule, *rows))
+
+
+@contextmanager
+def patience(seconds: int) -> Generator[None]:
+    """Interrupt what takes longer, with a TaskError."""
+
+    def give_up(*_: object) -> None:
+        raise TaskError(f"no plan within {seconds} s")
+
+    before = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def versions_of(*packages: str) -> dict[str, str]:

@@ -11,7 +11,7 @@ from robot_layouts.experts.driver import ArmDriver
 from robot_layouts.experts.geometry import heading
 from robot_layouts.experts.grips import Grip, role_grip
 from robot_layouts.experts.hands import Hand
-from robot_layouts.experts.script import OPEN, Scene, Waypoint
+from robot_layouts.experts.script import CLOSED, OPEN, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
 from robot_layouts.experts.ways import NoWayError, Ways
 from robot_layouts.kinematics.rotations import Floats, inverse, rotate
@@ -26,6 +26,7 @@ SETTLING, LEADING = 0.1, 0.2  # rad from its goal at which an arm settles; share
 # Share of the force with which jaws that swing close, that they hold a cube with: with more it
 # slips out in time, with less as it is lifted.
 HOLDING = 0.5
+FIRM = 10  # control steps that they close on after they feel a thing: drives press harder by and by
 # What is pushed slides on by v² / 2µg (m): 2µg of bodies on a table (m/s²), and the share of its
 # way that a push may lack, unless it stands for so many control steps.
 SLOWS, LACKING, STANDS = 2 * 0.3 * 9.81, 0.3, 3
@@ -100,6 +101,7 @@ class Player:
         self._leading = np.zeros_like(self._goal)
         self._current: Waypoint | None = None
         self._begun = self._elapsed = 0  # waypoints begun; steps taken in the current one
+        self._felt = 0  # steps of it since the jaws felt what they close on
         self._later: list[Floats] = []  # where it goes after its goal
         self._ways: Ways | None = None
         self._delayed = 0  # control steps that it has waited for a free way
@@ -196,7 +198,8 @@ class Player:
     def _is_done(self, waypoint: Waypoint, scene: Scene) -> bool:
         if self._elapsed < waypoint.steps:
             return False
-        if any((waypoint.to, waypoint.turn, waypoint.at, waypoint.joints)):
+        moves = any((waypoint.to, waypoint.turn, waypoint.at, waypoint.joints))
+        if moves:
             away = np.abs(self._arm(scene) - self._goal).max()
             if self._later or away > waypoint.near:
                 self._check_progress(float(away))
@@ -205,7 +208,11 @@ class Player:
             if lacks and self._waited < STANDS:
                 self._check_progress(float(away))
                 return False
-        return waypoint.until is None or waypoint.until(scene)
+        if waypoint.until is None:
+            return True
+        self._felt = self._felt + 1 if waypoint.until(scene) else 0
+        closes = self._jaws is not None and not moves and waypoint.gripper == CLOSED
+        return self._felt > (FIRM if closes and self._share is self._squeeze is None else 0)
 
     def _may_begin(self, done: set[str]) -> bool:
         if self._begun == len(self._waypoints):
@@ -243,7 +250,7 @@ class Player:
             self._pace = waypoint.pace
         if waypoint.pushes:
             self._stroke = self._left(scene)
-        self._begun, self._elapsed = self._begun + 1, 0
+        self._begun, self._elapsed, self._felt = self._begun + 1, 0, 0
         self._nearest_yet, self._waited = np.inf, 0
 
     def _goals(self, name: str, waypoint: Waypoint, scene: Scene) -> list[Floats]:
