@@ -145,12 +145,9 @@ class Drives:
 
     def _noted(self, joint: ModelJoint, stiffest: float) -> Drive:
         drive, raised = self._drive(joint, stiffest)
-        self._note(joint, raised)
-        return self._as_known(joint, drive, stiffest)
-
-    def _note(self, joint: ModelJoint, raised: bool) -> None:
         if raised and joint.name not in self._raised:
             self._raised.append(joint.name)
+        return self._as_known(joint, drive, stiffest)
 
     def _drive(self, joint: ModelJoint, stiffest: float) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
