@@ -40,7 +40,8 @@ from robot_layouts.experts.holds import AJAR, SPLAYED
 from robot_layouts.kinematics.rotations import multiply, rotate
 from robots import RobotDescriptor, RobotLayoutsError, RobotRegistry
 from robots.grafting import with_gripper
-from robots.gripper_motion import gripper_motion
+from robots.gripper_motion import gripper_motion, link_tree
+from robots.urdf.tcp import find_tcp
 from tasks import Area, MultiRobotTask, Object, State, TaskEnv, make, register_task
 from tasks.maths import Array
 
@@ -57,7 +58,7 @@ HANDED = (
 TOGETHER = ("tray", "pot_two_handles", "beam", "tote", "box")
 LEVEL = 0.01  # of what is turned by 0.2 rad
 FROM_BASE, APART = 0.55, 0.62  # of a reach; of the sum of two
-PICKED = 0.65  # of a reach; the middle of what is picked, so that no arm begins at it
+CLEAR, FARTHER = 0.2, 0.65  # of a reach; where a hand begins nearer to a thing, that lies farther
 FLAT = 0.005  # m; between what is held and the table, for the thinnest of fingers
 
 
@@ -133,9 +134,7 @@ class _Picking:
     def begin(self) -> tuple[TaskEnv, Callable[[Scene], list[Script]]]:
         robot, thing = robot_of(self._robot), ObjectRegistry.load(self._name)
         scale = robot.reach / REACH
-        half = min(thing.extent[:2]) / 2
-        away = max(PICKED * robot.reach, FROM_BASE * robot.reach + half)
-        layout = Layout({"arm": Placement(robot, (-away - 0.1, 0.0, 0.0))})
+        layout = Layout({"arm": Placement(robot, (-_away(robot) - 0.1, 0.0, 0.0))})
         env = _task(f"Pick{self._robot}{self._name}", layout, self._name, scale, _picked)
         by = 0.08 * scale
 
@@ -144,6 +143,14 @@ class _Picking:
             return [{"arm": (*taken, *lift(env, "arm", "thing", by))}]
 
         return env, scripts
+
+
+def _away(robot: RobotDescriptor) -> float:
+    """Return how far from its base a thing lies (m), so that a hand does not begin at it."""
+    tree, qpos = link_tree(robot), np.array(Placement(robot).start_qpos, float)
+    hand = find_tcp(robot, tree).places(tree.forward(qpos[None]))[0]
+    apart = float(np.linalg.norm(hand - (FROM_BASE * robot.reach, 0.0, 0.0)))
+    return (FROM_BASE if apart > CLEAR * robot.reach else FARTHER) * robot.reach
 
 
 class _Both:
