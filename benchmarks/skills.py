@@ -12,6 +12,7 @@ from functools import cache
 from math import pi
 from pathlib import Path
 
+import numpy as np
 import torch
 from tqdm import tqdm
 
@@ -35,8 +36,12 @@ from robot_layouts.experts import (
     lift,
     lift_together,
 )
+from robot_layouts.experts.holds import AJAR, SPLAYED
+from robot_layouts.kinematics.rotations import multiply, rotate
 from robots import RobotDescriptor, RobotLayoutsError, RobotRegistry
 from robots.grafting import with_gripper
+from robots.gripper_motion import gripper_motion, link_tree
+from robots.urdf.tcp import find_tcp
 from tasks import Area, MultiRobotTask, Object, State, TaskEnv, make, register_task
 from tasks.maths import Array
 
@@ -53,6 +58,8 @@ HANDED = (
 TOGETHER = ("tray", "pot_two_handles", "beam", "tote", "box")
 LEVEL = 0.01  # of what is turned by 0.2 rad
 FROM_BASE, APART = 0.55, 0.62  # of a reach; of the sum of two
+CLEAR, FARTHER = 0.2, 0.65  # of a reach; where a hand begins nearer to a thing, that lies farther
+FLAT = 0.005  # m; between what is held and the table, for the thinnest of fingers
 
 
 def skills(*, seeds: int = 1, only: tuple[str, ...] = (), out: Path = DOCS / "skills.json") -> int:
@@ -127,7 +134,7 @@ class _Picking:
     def begin(self) -> tuple[TaskEnv, Callable[[Scene], list[Script]]]:
         robot, thing = robot_of(self._robot), ObjectRegistry.load(self._name)
         scale = robot.reach / REACH
-        layout = Layout({"arm": Placement(robot, (-FROM_BASE * robot.reach - 0.1, 0.0, 0.0))})
+        layout = Layout({"arm": Placement(robot, (-_away(robot) - 0.1, 0.0, 0.0))})
         env = _task(f"Pick{self._robot}{self._name}", layout, self._name, scale, _picked)
         by = 0.08 * scale
 
@@ -136,6 +143,14 @@ class _Picking:
             return [{"arm": (*taken, *lift(env, "arm", "thing", by))}]
 
         return env, scripts
+
+
+def _away(robot: RobotDescriptor) -> float:
+    """Return how far from its base a thing lies (m), so that a hand does not begin at it."""
+    tree, qpos = link_tree(robot), np.array(Placement(robot).start_qpos, float)
+    hand = find_tcp(robot, tree).places(tree.forward(qpos[None]))[0]
+    apart = float(np.linalg.norm(hand - (FROM_BASE * robot.reach, 0.0, 0.0)))
+    return (FROM_BASE if apart > CLEAR * robot.reach else FARTHER) * robot.reach
 
 
 class _Both:
@@ -218,7 +233,12 @@ def _lifted(state: State, height: float) -> Array:
 
 def _row(group: str, seen: Mapping[str, Mapping[str, str]]) -> list[str]:
     reasons = [reason for episodes in seen.values() for reason in episodes.values()]
-    solved, unfit = reasons.count(""), sum(map(_is_unfit, reasons))
+    solved = reasons.count("")
+    unfit = sum(
+        _is_unfit(reason) or (bool(reason) and group in PICKERS and _lies_flat(group, name))
+        for name, episodes in seen.items()
+        for reason in episodes.values()
+    )
     share = f"{solved} of {len(reasons) - unfit} ({100 * solved / (len(reasons) - unfit):.0f} %)"
     return [_shown(group), str(len(reasons)), str(unfit), share]
 
@@ -227,6 +247,21 @@ def _is_unfit(reason: str) -> bool:
     """Return whether a thing is wider than the gripper opens, or lies too flat to reach under."""
     flat = "has no room to take" in reason and " and table-workspace overlap" in reason
     return flat or "takes what is less than" in reason
+
+
+@cache
+def _lies_flat(robot: str, name: str) -> bool:
+    """Return whether a finger would be in the table in each grasp that a gripper opens for."""
+    thing, motion = ObjectRegistry.load(name), gripper_motion(robot_of(robot))
+    widest = motion.widest_within(SPLAYED)
+    grasps = [grasp for grasp in thing.grasps if grasp.opening + AJAR <= widest]
+    if not grasps:
+        return True
+    rest, opening = np.array(thing.rest()), np.array([grasp.opening for grasp in grasps])
+    turned = multiply(rest, np.array([grasp.quaternion for grasp in grasps]))
+    steep = np.abs(rotate(turned, np.array([0.0, 1.0, 0.0]))[:, 2])  # sine of how fingers close
+    place = thing.height() + rotate(rest, np.array([grasp.position for grasp in grasps]))[:, 2]
+    return bool((place - steep * opening / 2 < steep * FLAT).all())
 
 
 def _failures(group: str, seen: Mapping[str, Mapping[str, str]]) -> Iterator[str]:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robot_layouts.experts.grips import MIDDLE_DEPTHS, Grip, grip_of, swings
-from robot_layouts.experts.script import Scene
+from robot_layouts.experts.script import Pose, Scene
 from robot_layouts.kinematics.rotations import (
     Floats,
     inverse_pose,
     pose_matrix,
+    quaternion_of,
     rotation_about,
 )
 from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
@@ -70,8 +71,6 @@ class Hand:
         motion: How its gripper moves.
         length: How far it reaches (m).
         quick: Whether its fingers are where they are driven to after each control step.
-        light: Whether they are so because nothing but their own mass resists: such fingers are
-            driven into what they hold.
         columns: Indices of the arm's joints among the robot's, those of a head or a torso that are
             driven with it included.
         base: Pose of the robot's base in the world, (4, 4) (m).
@@ -107,7 +106,6 @@ class Hand:
         self.quick = all(
             np.min(group.stiffness) * seconds > QUICK * np.max(group.damping) for group in grippers
         )
-        self.light = self.quick and not any(np.any(group.armature) for group in grippers)
         self._random = scattered(self._tree.limits[self._aiming], RANDOM_STARTS)
 
     def grip(
@@ -163,6 +161,11 @@ class Hand:
     def held(self, scene: Scene, body: str) -> Floats:
         """Return the pose of a body in the TCP link's frame, (4, 4) (m)."""
         return inverse_pose(self.link(self.qpos(scene)[None])[0]) @ pose_matrix(*scene.body(body))
+
+    def brought(self, qpos: Floats, held: Floats) -> Pose:
+        """Return where what it holds is in a posture, (dof,) (rad, m); see `held`."""
+        pose = self.link(qpos[None])[0] @ held
+        return pose[:3, 3], quaternion_of(pose[:3, :3])
 
     def shut(self, opening: float) -> Floats | None:
         """Return the frame of the gripper where it holds what is so wide, (4, 4) (m), or None.

@@ -89,7 +89,7 @@ def routes(
         ways: The ways.
         what: What it is to do, for the reason: "to take the mug".
         touched: Bodies that its fingers may touch.
-        carried: A body that goes with it, and is looked at only where `Way.moved` says where it is.
+        carried: A body that it holds, whose frame in the TCP link's is that of the ways.
         besides: Robots that are not looked at.
         count: How many ways are enough.
         loose: See `Hand.reach`.
@@ -112,6 +112,8 @@ def routes(
         any_followed = True
         way = ways[route.number]
         moved = way.moved or [NOTHING] * len(route.postures)
+        if carried is not None:  # arms of few joints turn it otherwise than was asked for
+            moved = [{carried: hand.brought(qpos, way.frame)} for qpos in route.postures]
         ends = [*zip(route.postures, moved, strict=True)]
         found = (look.overlap([{hand.owner: q}], there) for q, there in ends[:2] + ends[2:][-1:])
         overlap = max(filter(None, found), key=lambda one: one.depth, default=None)

@@ -278,9 +278,6 @@ def taking(
     def pressed(scene: Scene) -> bool:
         return held(scene) and (firm(scene) or hand.share(scene) < SHUT)
 
-    def kept(scene: Scene) -> float:
-        return 0.0 if firm(scene) else holds.holding
-
     def closed(scene: Scene) -> float:
         ((hold, _),) = chosen
         if not swings(hand.motion, hold.grasp.opening):
@@ -308,7 +305,7 @@ def taking(
         ),
         Waypoint(
             f"hold {body}",
-            squeeze=kept if hand.light else holds.holding,
+            squeeze=holds.holding,
             steps=4,
             until=held,
             most=HELD,
@@ -349,10 +346,7 @@ def carry(
 
     def choose(scene: Scene) -> None:
         frame = hand.held(scene, body)
-        offered = [
-            Way(frame, [pose_matrix(*pose) for pose in way], moved=[{body: pose} for pose in way])
-            for way in ways(scene)
-        ]
+        offered = [Way(frame, [pose_matrix(*pose) for pose in way]) for way in ways(scene)]
         what = f"to {names[-1]}"
         (best,) = routes(
             task, hand, scene, offered, what=what, touched=[body], carried=body, loose=loose

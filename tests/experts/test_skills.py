@@ -139,6 +139,22 @@ def test_a_hand_leans_where_the_arm_cannot_draw_it_back_from_a_grasp_else():
     played(env, {"arm": grasp(env, "arm", "jug", jug, up=0.045)})
 
 
+class Turned(MultiRobotTask):
+    layout = Layout({"arm": Placement("so101", (-0.364, 0.0, 0.0))})
+    max_episode_steps = 100
+    peg = Object("peg", spawn=Area(x=-0.0884, y=-0.0099, yaw=-2.96))
+
+    def evaluate(self, state):
+        """Success: the arm holds it above the table."""
+        return {"success": (state.position("peg")[:, 2] > 0.02) & state.is_grasping("arm", "peg")}
+
+
+def test_what_an_arm_of_few_joints_holds_turns_with_its_hand_and_so_is_not_in_its_jaws():
+    env, peg = made(Turned), load("peg")
+    script = {"arm": (*grasp(env, "arm", "peg", peg, up=0.045), *lift(env, "arm", "peg", 0.045))}
+    assert "no room to lift" not in first_success(env, 0, lambda scene: [script]).reason
+
+
 class Far(OneArm):
     mug = Object("mug", spawn=Area(x=0.3, y=0.5))
 
