@@ -156,7 +156,7 @@ def _joined(pieces: Sequence[Surface]) -> Surface:
 
 
 def _seen(parts: Sequence[Surface]) -> list[Surface]:
-    """Return parts without the triangles inside of them, which nobody sees.
+    """Return parts without the triangles inside of them, which are not seen.
 
     Space is divided into cells of `_OPENING`. Those that no surface crosses are outside, if they
     are connected with what is around all parts; a triangle is seen that crosses a cell beside one.
