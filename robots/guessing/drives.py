@@ -24,11 +24,11 @@ SHORTEST_STEP = 0.04  # rad, m; what ManiSkill's Panda truly goes in one control
 # physics advances by 0.01 s; with a force that is `JUST_ENOUGH`, 94 %.
 FREQUENCY = 150.0  # rad/s
 JUST_ENOUGH = 6.0  # of inertia · step / CONTROL_STEP²; 4 is the least there is
+SETTLING = {"m": 0.1, "rad": 0.2}  # s; of a finger that goes to a place
 # Of a joint's frequency (rad/s). Physics in single precision shakes light links that are driven
 # more stiffly; and fingers, which touch each other, fly off.
 STIFFEST, STIFFEST_FINGER = 1e3, 2 * FREQUENCY
-CLOSING = 8  # control steps that a hand takes from open to closed
-SHORTEST_LEVER = 0.01  # m per rad; by which a finger that turns at least presses
+MOST_DAMPED = 7e3  # 1/s, of a finger's damping by its inertia, as a Panda's has
 LIGHTEST = 1e-6  # kg·m², kg; of what hangs on a joint, if a URDF gives nothing that weighs
 # Links push each other: where two axes line up, one joint's motion turns the other by as much, and
 # PhysX parts light joints from heavy ones only roughly. Motors and gears have inertia of their own;
@@ -102,8 +102,7 @@ class Drives:
             "drives: stiffness from the inertia that hangs on each joint, critically damped, so"
             f" that a control step of {CONTROL_STEP:g} s covers what the action asks for; forces"
             " from the URDF's efforts",
-            "armature: motors and gears add half of the inertia that hangs on each joint, and to"
-            " fingers so much that their force brings them half of their range in a control step",
+            "armature: motors and gears add half of the inertia that hangs on each joint",
             f"action: arm joints move per control step by up to {LONGEST_STEP:g} rad or m, or as"
             " far as their force brings them",
         ]
@@ -145,9 +144,12 @@ class Drives:
 
     def _noted(self, joint: ModelJoint, stiffest: float) -> Drive:
         drive, raised = self._drive(joint, stiffest)
+        self._note(joint, raised)
+        return self._as_known(joint, drive, stiffest)
+
+    def _note(self, joint: ModelJoint, raised: bool) -> None:
         if raised and joint.name not in self._raised:
             self._raised.append(joint.name)
-        return self._as_known(joint, drive, stiffest)
 
     def _drive(self, joint: ModelJoint, stiffest: float) -> tuple[Drive, bool]:
         """Return a drive, and whether its force is more than the URDF's effort."""
@@ -187,34 +189,26 @@ class Drives:
         return self._hanging[joint.name] + self._armature(joint)
 
     def _armature(self, joint: ModelJoint) -> float:
-        known = self._known_armature(joint)
-        return ARMATURE * self._hanging[joint.name] if known is None else known
-
-    def _known_armature(self, joint: ModelJoint) -> float | None:
         known = self._known.get(joint.name)
-        return None if known is None else known.armature
+        if known is not None and known.armature is not None:
+            return known.armature
+        return ARMATURE * self._hanging[joint.name]
 
-    def gripping(self, joint: ModelJoint, lever: float) -> Drive:
-        """Return the drive of a finger's joint, whose targets are places, by what it presses with.
+    def gripping(self, joint: ModelJoint) -> Drive:
+        """Return the drive of a joint whose targets are places, far away at times: it takes time.
 
-        It has all of its force with its target an eighth of its range ahead, so that fingers press
-        as they are asked to. A solver parts a light joint's drive from what it presses on only
-        roughly: such fingers sink in. A URDF says nothing of motors and gears, whose inertia
-        outweighs a finger's; here it is force · step² / range: from rest, with all of the force, a
-        finger goes half of its range in a control step.
-
-        Args:
-            joint: The joint.
-            lever: How far a tip goes as it moves (m per rad, or 1).
+        ManiSkill's Panda drives its fingers, which slide, with a damping of a tenth of the
+        stiffness. Fingers that turn go a longer way, and hit harder.
         """
-        low, high = joint.span
-        most = FORCE * max(lever, SHORTEST_LEVER)
-        force = min(joint.effort or most, most)
+        (drive, raised), settling = self._drive(joint, STIFFEST), SETTLING[joint.unit]
+        self._note(joint, raised)
         inertia = self.moved_by(joint)
-        if self._known_armature(joint) is None:
-            inertia = max(inertia, force * CONTROL_STEP**2 / (high - low))
-        stiffness = min(force * CLOSING / (high - low), inertia * STIFFEST_FINGER**2)
-        return self.geared(joint, inertia, stiffness, force, CONTROL_STEP)
+        damping = min(max(drive.damping, drive.stiffness * settling), inertia * MOST_DAMPED)
+        stiffness = min(drive.stiffness, damping / settling)
+        force = min(drive.force_limit, FORCE)
+        return replace(
+            drive, stiffness=_rounded(stiffness), damping=_rounded(damping), force_limit=force
+        )
 
     def geared(
         self,

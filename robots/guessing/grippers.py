@@ -21,7 +21,6 @@ from robots.bodies.hulls import Hull
 from robots.bodies.overlaps import overlapping
 from robots.guessing.anatomy import LimbJoints
 from robots.guessing.drives import (
-    CLOSING,
     CONTROL_STEP,
     FORCE,
     FREQUENCY,
@@ -43,6 +42,7 @@ MOST_JOINTS = 20  # of a hand whose fingers collide with each other
 USUALLY = 0.5  # of `POSTURES`; links of a hand that overlap so often are one mechanism
 POSTURES = 32  # random ones of a hand
 NOTICEABLE = 1e-4  # m; how much opening changes the distance of the tips
+CLOSING = 8  # control steps that a hand takes from open to closed
 LEAST = 1e-3  # m; of what counts as a tip's travel
 PRESS = 30.0  # N, of a finger whose force nothing gives: about what ManiSkill's Panda presses with
 SPARE = 2.0  # how much more than its share of the force a leader may take to keep the fingers even
@@ -296,7 +296,7 @@ def _group(
 ) -> JointGroup:
     """Return the group of joints that one value drives, within a span, and goes a way."""
     linkage = find_linkage(followers, way, tips, drives)
-    made = linkage.drives if linkage else [_jaw(f.joint, tips, drives) for f in followers]
+    made = linkage.drives if linkage else [drives.gripping(f.joint) for f in followers]
     ahead: dict[str, Any] = {"leaders": linkage.leaders, "lead": linkage.lead} if linkage else {}
     return JointGroup(
         tuple(f.joint.name for f in followers),
@@ -311,12 +311,6 @@ def _group(
         **drive_fields(made),
         **ahead,
     )
-
-
-def _jaw(joint: ModelJoint, tips: Fingertips, drives: Drives) -> Drive:
-    paths = ((end, tips.stance.model.path_to(end)) for end in tips.ends)
-    levers = (tips.lever(end, joint) for end, path in paths if joint in path)
-    return drives.gripping(joint, max(levers, default=1.0))
 
 
 def _apart(

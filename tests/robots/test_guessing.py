@@ -363,21 +363,6 @@ class TestHands:
         assert multiplier * low + offset == 0.0
         assert len(found.descriptor.arm_joints) == 6
 
-    def test_a_light_jaw_presses_with_its_force_and_is_as_heavy_as_its_motor(self, tmp_path):
-        parts, last = single_arm(end="")
-        parts.link("fixed_part", 0.05, "0.1 0.01 0.02", "0.07 -0.01 0")
-        parts.joint("mount", last, "fixed_part", "0.03 0 0", kind="fixed")
-        parts.link("moving_jaw", 0.005, "0.08 0.01 0.02", "0.05 0 0")
-        parts.joint("jaw", last, "moving_jaw", "0.05 0.01 0", axis="0 0 1", limits=(0.0, 1.0))
-        group = guess(parts, tmp_path).descriptor.action_split.groups["gripper"]
-        (stiffness,), (damping,), (force,), (armature,) = (
-            np.broadcast_to(numbers, 1).tolist()
-            for numbers in (group.stiffness, group.damping, group.force_limit, group.armature)
-        )
-        assert stiffness / 8 == pytest.approx(force, rel=0.01)  # an eighth of its range ahead
-        assert armature == pytest.approx(force * 0.05**2, rel=0.01)  # it outweighs the jaw
-        assert (damping * 0.01 + stiffness * 0.01**2) / armature < 10  # in a step of physics
-
     def test_a_wrist_that_is_called_gripper_is_no_jaw(self, tmp_path):
         parts, _ = single_arm()
         parts.joints = [joint.replace("a_joint6", "gripper_roll") for joint in parts.joints]
