@@ -34,8 +34,8 @@ from tasks import Needs, get_task_class, list_tasks, make
 from tasks.episode import play
 
 ROBOTS = ("so101", "xarm7", "xarm7_with_panda", "z1", "fetch", "ur10")
-PATIENCE = 150  # s that an expert may plan an episode
 PAIRED = ("so101", "xarm7", "panda", "z1", "ur5", "ur10")  # of which two makes are drawn
+PATIENCE = 150  # s that an expert may plan an episode
 MIXED = (
     ("CellPressTogether-v1", ("ur10", "panda", "xarm7")),
     ("CellGatherBlocks-v1", ("ur10", "panda_stick", "panda", "xarm7")),

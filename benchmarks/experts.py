@@ -264,6 +264,7 @@ def _bar() -> str:
 
 def lift_bar(task: TaskEnv, seed: int) -> Plan:
     """Return the actions of the bar's expert, in the lengths in which the bar is declared."""
+    # Private, as the file stays as it is: a published receipt names its SHA-256.
     script = lifting._script  # pyright: ignore[reportPrivateUsage]
     styles = lifting.STYLES
     return first_success(

@@ -211,8 +211,9 @@ class Player:
         if waypoint.until is None:
             return True
         self._felt = self._felt + 1 if waypoint.until(scene) else 0
-        closes = self._jaws is not None and not moves and waypoint.gripper == CLOSED
-        return self._felt > (FIRM if closes and self._share is self._squeeze is None else 0)
+        told = self._share is not None or self._squeeze is not None
+        closes = self._jaws is not None and waypoint.gripper == CLOSED and not (moves or told)
+        return self._felt > (FIRM if closes else 0)
 
     def _may_begin(self, done: set[str]) -> bool:
         if self._begun == len(self._waypoints):

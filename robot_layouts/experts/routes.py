@@ -36,7 +36,7 @@ class Way:
         enter: Number of the pose to which the arm goes first.
         share: How far the gripper is open meanwhile, from 0 to 1; None is as now.
         moved: For each of the poses, where bodies are then that are elsewhere now; without any, all
-            are where they are.
+            but what is carried are where they are.
     """
 
     frame: Floats
@@ -111,8 +111,9 @@ def routes(
     for _, route in zip(range(CHECKED), followed, strict=False):
         any_followed = True
         way = ways[route.number]
-        moved = way.moved or [NOTHING] * len(route.postures)
-        if carried is not None:  # arms of few joints turn it otherwise than was asked for
+        if carried is None:
+            moved = way.moved or [NOTHING] * len(route.postures)
+        else:  # arms of few joints turn it otherwise than was asked for
             moved = [{carried: hand.brought(qpos, way.frame)} for qpos in route.postures]
         ends = [*zip(route.postures, moved, strict=True)]
         found = (look.overlap([{hand.owner: q}], there) for q, there in ends[:2] + ends[2:][-1:])

@@ -101,6 +101,31 @@ def test_what_is_inside_is_left_out(made_here, tmp_path):
 
 
 @pytest.mark.long
+def test_a_part_of_which_nothing_is_seen_is_left_out(made_here, tmp_path):
+    path = tmp_path / "two.glb"
+    scene = trimesh.Scene()
+    for name, radius, colour in (("in", 0.03, (255, 0, 0, 255)), ("out", 0.05, (0, 255, 0, 255))):
+        ball = trimesh.creation.icosphere(5, radius)
+        paint = trimesh.visual.material.PBRMaterial(baseColorFactor=colour)
+        ball.visual = trimesh.visual.TextureVisuals(material=paint)
+        scene.add_geometry(ball, geom_name=name)
+    scene.export(path)
+    (part,) = light_meshes.light_parts(str(path), (1.0, 1.0, 1.0))
+    assert part.finish["base_color"] == [0, 1, 0, 1]
+    reach = np.linalg.norm(trimesh.load_mesh(part.file, process=False).vertices, axis=1)
+    assert reach.min() > 0.04
+
+
+@pytest.mark.parametrize("wrong", [np.nan, 0.0])
+def test_a_mesh_without_a_surface_is_drawn_as_it_is(made_here, tmp_path, wrong):
+    ball = trimesh.creation.icosphere(3, 0.05)
+    ball.vertices[:, 0] *= wrong
+    ball.vertices[:, 1] *= wrong
+    ball.export(tmp_path / "none.ply")
+    assert light_meshes.light_parts(str(tmp_path / "none.ply"), (1.0, 1.0, 1.0)) == ()
+
+
+@pytest.mark.long
 def test_it_is_smooth_and_faces_outwards(made_here, tmp_path):
     """Also if it is mirrored and stretched."""
     path = bumpy(tmp_path)

@@ -32,8 +32,9 @@ _FOLDER = "light_meshes"
 _METHOD = 2  # to be raised when other meshes are made
 _REMOVED = (0.6, 0.8, 0.9, 0.95, 0.98, 0.995)  # shares of triangles that may go
 _GAIN = 0.97  # of a piece's triangles; if fewer removed leave more than that, no more are tried
-_OPENING = 1e-3  # m; narrower ones show nothing of what is behind them
-_MOST_CELLS = 2**25  # of that size, in which hidden triangles are looked for
+_OPENING = 1e-3  # m, of a cell: what is two of them wide may show what is behind it
+_MOST_CELLS = 2**25  # in which hidden triangles are looked for
+_MOST_POINTS = 2**23  # of surfaces, by which the cells are found that they cross
 _IN_CELL = 20  # points for each cell that a surface crosses: so many that none is left without
 _FEW = 200  # triangles of a connected piece, which stays as it is
 _WORTH = 0.8  # of a file's triangles; if more would be left, it is drawn as it is
@@ -116,17 +117,20 @@ def _made(path: str, scale: Floats) -> dict[str, bytes]:
     shape: Any = RenderShapeTriangleMesh(path, [1.0, 1.0, 1.0], None)
     before = sum(len(part.triangles) for part in shape.parts)
     own = [] if _has_textures(shape) else [_welded(part, scale) for part in shape.parts]
-    made = [_light(part) for part in _seen(own)]
+    whole = all(np.isfinite(corners).all() for corners, _ in own)
+    seen = _seen(own) if whole else []
+    made = [(i, _light(part)) for i, part in enumerate(seen) if len(part[1])]
+    after = sum(len(faces) for _, (_, faces) in made)
     kept: list[Any] = []
     files: dict[str, bytes] = {}
-    if made and sum(len(faces) for _, faces in made) <= _WORTH * before:
-        for i, (part, (corners, faces)) in enumerate(zip(shape.parts, made, strict=True)):
-            files[f"{i}.ply"] = _ply(corners, faces)
-            kept.append({name: getattr(part.material, name) for name in FINISH})
+    if made and after <= _WORTH * before:
+        for i, surface in made:
+            files[f"{len(kept)}.ply"] = _ply(*surface)
+            kept.append({name: getattr(shape.parts[i].material, name) for name in FINISH})
     about = {
         "file": Path(path).name,
         "fast-simplification": version("fast-simplification"),
-        "triangles": [before, sum(len(faces) for _, faces in made)],
+        "triangles": [before, after],
         "parts": kept,
     }
     return {**files, "parts.json": json.dumps(about, indent=1).encode()}
@@ -150,9 +154,7 @@ def _joined(pieces: Sequence[Surface]) -> Surface:
     """Return the corners and triangles of all pieces, one after the other."""
     starts = np.cumsum([0, *(len(corners) for corners, _ in pieces)])
     faces = [own + start for (_, own), start in zip(pieces, starts[:-1], strict=True)]
-    empty = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    corners = [corners for corners, _ in pieces]
-    return np.concatenate([empty[0], *corners]), np.concatenate([empty[1], *faces])
+    return np.concatenate([corners for corners, _ in pieces]), np.concatenate(faces)
 
 
 def _seen(parts: Sequence[Surface]) -> list[Surface]:
@@ -164,12 +166,14 @@ def _seen(parts: Sequence[Surface]) -> list[Surface]:
     import trimesh
     from scipy import ndimage
 
+    if not any(len(faces) for _, faces in parts):
+        return list(parts)
     corners, faces = _joined(parts)
-    size = np.ceil(np.ptp(corners, axis=0) / _OPENING) + 3 if len(faces) else np.array([np.inf])
+    size = np.ceil(np.ptp(corners, axis=0) / _OPENING) + 3
     if size.prod() > _MOST_CELLS:
         return list(parts)
     whole = trimesh.Trimesh(corners, faces, process=False)
-    between, on = _sampled(whole, (1, _MOST_CELLS, _OPENING**2 / _IN_CELL))
+    between, on = _sampled(whole, (1, _MOST_POINTS, _OPENING**2 / _IN_CELL))
     points = np.concatenate([between, whole.triangles_center, *np.moveaxis(whole.triangles, 1, 0)])
     on = np.concatenate([on, np.tile(np.arange(len(faces)), 4)])
     x, y, z = ((points - corners.min(0)) / _OPENING + 1).astype(np.int64).T
@@ -244,10 +248,11 @@ def _corrected(lighter: Surface, best: Surface, whole: Surface) -> Surface:
 
 def _standing_for(lost: NDArray[np.bool_], whole: Surface, best: Surface) -> NDArray[np.bool_]:
     """Return which triangles of the best surface are where some of the whole one are, (T,)."""
+    if not lost.any():
+        return np.zeros(len(best[1]), bool)
     near, _, on = _nearest(best, whole)
     there = _of_triangles(lost[near], on, best)
-    if lost.any():
-        there[_nearest(_used(whole[0], whole[1][lost]), best)[0]] = True
+    there[_nearest(_used(whole[0], whole[1][lost]), best)[0]] = True
     return there
 
 
