@@ -200,7 +200,9 @@ class LayoutCheck:
         )
         depth = pairs[0].depth
         if table:
-            advice = to_leave_the_table(one.name, self._layout[one.name], overlaps[0])
+            top = float(other.high[..., 2].max())
+            lift = top - min(one.lowest(overlap) for overlap in overlaps)
+            advice = to_leave_the_table(one.name, self._layout[one.name], lift)
             return Finding("table", True, between[:1], pairs, depth, "m", what, advice)
         advice, farther = to_stand_apart(self._layout, one, other)
         return Finding("collision", True, between, pairs, depth, "m", what, advice, farther)

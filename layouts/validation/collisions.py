@@ -53,6 +53,11 @@ class Postures:
         """Least and greatest corner of each hull's box around all postures, (hulls, 3) (m)."""
         return self.low.min(axis=0), self.high.max(axis=0)
 
+    def lowest(self, approach: Approach) -> float:
+        """Return how low the first link of an approach is in its posture (m)."""
+        hulls = [i for i, link in enumerate(self.links) if link == approach.links[0]]
+        return float(self.low[approach.posture, hulls, 2].min())
+
     def moved(self, by: Floats) -> Postures:
         """Return the same postures elsewhere, by a translation, (3,) (m)."""
         poses = self.poses.copy()

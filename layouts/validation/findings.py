@@ -207,9 +207,9 @@ def to_touch_itself_no_more(placement: Placement, overlaps: Sequence[Approach]) 
     return f"{to_start_elsewhere(placement)}; or {noise}"
 
 
-def to_leave_the_table(name: str, placement: Placement, deepest: Approach) -> str:
-    """Say how far to raise a robot that sinks into a table."""
-    lift = MOVE_STEP - deepest.distance
+def to_leave_the_table(name: str, placement: Placement, sunk: float) -> str:
+    """Say how far to raise a robot that sinks into a table so far (m)."""
+    lift = sunk + MOVE_STEP
     return f"raise the base of {name} by {lift:.3f} m, or {to_start_elsewhere(placement)}"
 
 

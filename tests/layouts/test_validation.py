@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import re
 import sys
 from dataclasses import replace
 
@@ -217,6 +218,13 @@ class TestTable:
         assert finding.links[0].links == ("panda_link1", "table")
         assert finding.amount == pytest.approx(0.2 - 0.141, abs=0.001)
         assert "raise the base of arm by 0.069 m" in finding.advice
+
+    @pytest.mark.parametrize("place", [(-0.4, 0.0, -0.2), (-0.4, 1.25, -0.3)])
+    def test_raised_by_as_much_it_leaves_the_table(self, place):
+        """Also if the nearest way out of it is over an edge."""
+        (finding,) = self.validate(position=place).findings
+        lift = float(re.search(r"by ([\d.]+) m", finding.advice)[1])
+        assert self.validate(position=(*place[:2], place[2] + lift)).ok
 
     def test_tables_of_the_layout_count(self):
         layout = around_table({"a": "panda", "b": "so100"}, edges=["north", "south"])
