@@ -29,7 +29,7 @@ from robots.urdf.mesh_files import MAX_MESH_BYTES
 
 DEVIATION = 0.75e-3  # m
 _FOLDER = "light_meshes"
-_METHOD = 2  # to be raised when other meshes are made
+_METHOD = 3  # to be raised when other meshes are made
 _REMOVED = (0.6, 0.8, 0.9, 0.95, 0.98, 0.995)  # shares of triangles that may go
 _GAIN = 0.97  # of a piece's triangles; if fewer removed leave more than that, no more are tried
 _OPENING = 1e-3  # m, of a cell: what is two of them wide may show what is behind it
