@@ -106,6 +106,10 @@ class SimulationError(RobotLayoutsError, RuntimeError):
     """A world that cannot be built or stepped as asked."""
 
 
+class DivergedError(SimulationError):
+    """Physics that diverged: something is nowhere, or flies off."""
+
+
 class TaskError(RobotLayoutsError, ValueError):
     """A task asked for something that it does not offer (a mode, a field, a robot)."""
 

@@ -138,7 +138,9 @@ def evaluate(
     What comes out depends on nothing but the policy, the task and the seeds: every episode is
     played in a world built anew by a copy of the policy as it was passed, and the random
     generators of Python, NumPy and torch start from its seed. An episode ends with the first step
-    that is terminated or truncated.
+    that is terminated or truncated. An episode in which physics diverges is a failure that ends
+    with the step before, and its reason says so; where several were played at once, each is
+    played again alone.
 
     Args:
         policy: Maps the observation, (1, D) float32 if ``obs_mode`` is ``"state"``, to the action,

@@ -21,7 +21,7 @@ from robot_layouts.simulation import Simulation, State
 from robot_layouts.simulation.checks.overlaps import Causes
 from robot_layouts.simulation.maths import Array, all_finite
 from robot_layouts.simulation.readout import Lost
-from robots import SimulationError, TaskError
+from robots import DivergedError, TaskError
 
 WARNS, REFUSES = 10.0, 100.0  # times a joint's largest speed
 MOST = 3  # reports of a joint
@@ -63,7 +63,7 @@ class SpeedWatch:
             elapsed: Steps of each environment's episode, (N,).
 
         Raises:
-            SimulationError: If a joint is `REFUSES` times as fast as its limit.
+            DivergedError: If a joint is `REFUSES` times as fast as its limit.
         """
         speeds = state.joint_velocities
         if np.vdot(speeds, speeds) < self._least:  # then none is too fast; often enough that is all
@@ -82,7 +82,7 @@ class SpeedWatch:
         for env in moving:
             worst = int(times[env].argmax())
             if not times[env, worst] <= REFUSES:  # be it NaN
-                raise SimulationError(
+                raise DivergedError(
                     f"physics diverged: {self._words(times, state, env, worst, elapsed)};"
                     " reset(options={'reconfigure': True}) builds its world anew"
                 )
@@ -121,7 +121,7 @@ def refuse_state(
         elapsed: Steps of each environment's episode, (N,).
 
     Raises:
-        SimulationError: Always; names robot or body, environment and step, and of a robot the joint
+        DivergedError: Always; names robot or body, environment and step, and of a robot the joint
             that was the fastest before, and the likely cause.
     """
     lost = state.lost() or Lost("a frame", 0)
@@ -130,7 +130,7 @@ def refuse_state(
         joint = speeds.fastest(state if before is None else before, lost.robot, lost.env)
         cause = speeds.causes.of(lost.robot, joint)
         why = f" (before, {joint} was the fastest of its joints; the likely cause: {cause})"
-    raise SimulationError(
+    raise DivergedError(
         f"physics diverged: {lost.what} has numbers that are not finite in environment {lost.env}"
         f" at step {elapsed[lost.env]}{why}; reset(options={{'reconfigure': True}}) builds its"
         " world anew"
@@ -165,7 +165,7 @@ def refuse_observation(
 
     Raises:
         TaskError: If a part of the task's is not; names it, environment and step.
-        SimulationError: If it is the robots' own.
+        DivergedError: If it is the robots' own.
     """
     for name, part in parts.items():
         if not all_finite(part):

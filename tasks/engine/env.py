@@ -343,7 +343,7 @@ class TaskEnv(Remade):
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
-            SimulationError: If physics diverged: a pose is not finite, or a joint moves at a
+            DivergedError: If physics diverged: a pose is not finite, or a joint moves at a
                 hundred times its largest speed. At ten times a `RuntimeWarning` says so.
             TaskError: If the task's reward or observation is not finite.
         """

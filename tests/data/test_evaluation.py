@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 import traceback
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +14,16 @@ import pytest
 import torch
 
 import tasks
+from layouts import Layout, Placement
 from robot_layouts.__main__ import main
-from robot_layouts.data import Score, evaluate
-from robot_layouts.data.playing.executor import ProcessExecutor, WorkerError
+from robot_layouts.data import Score, evaluate, record
+from robot_layouts.data.playing.executor import InProcessExecutor, ProcessExecutor, WorkerError
+from robot_layouts.data.receipts import Receipt, verify
 from robot_layouts.experts import find_expert, registry
 from robots import TaskError, UnknownNameError
 from tasks.episode import REBUILT, play
 from tests.data.plays import NO_PLAN, Here, at_random
-from tests.data.policies import TASK, Wanders, fails, still
+from tests.data.policies import ACTIONS, TASK, Wanders, fails, still
 
 ROOT = Path(__file__).parents[2]
 
@@ -195,3 +198,62 @@ def test_the_command(capsys):
     assert re.match(r"PushT-v1, still: 0 of 2 episodes with success \(0.0%\)\non av", printed)
     assert main([*words, "--policy=tests.data.policies:stil"]) == 1
     assert "no policy 'tests.data.policies:stil': module" in capsys.readouterr().err
+
+
+TWO_IN_ONE_PLACE = Layout(
+    {
+        "left": Placement("panda", position=(0.0, 0.0, 0.0)),
+        "right": Placement("panda", position=(0.02, 0.0, 0.0)),
+    }
+)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_physics_that_diverges_ends_an_episode_as_a_failure(tmp_path):
+    making = {"layout": TWO_IN_ONE_PLACE, "check_layout": False}
+    found = evaluate(
+        lambda obs: np.zeros(16),
+        "TwoRobotPickCube-v1",
+        [0, 1],
+        workers=0,
+        receipt=tmp_path / "receipt.json",
+        **making,
+    )
+    assert found.successes == {0: False, 1: False}
+    for reason in found.reasons.values():
+        assert re.match(r"physics diverged: robot '(left|right)' is thrown about", reason)
+    assert Receipt.read(tmp_path / "receipt.json").episodes[1].reason == found.reasons[1]
+
+
+@dataclass
+class Hurries:
+    """Moves faster and faster, up to a speed that each seed has."""
+
+    fastest: float | None = None
+    speed: float = 0.0
+
+    def __call__(self, obs):
+        self.fastest = self.fastest or random.uniform(0.1, 0.9)
+        self.speed = min(self.speed + 0.02, self.fastest)
+        return np.full(ACTIONS, self.speed)
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_what_diverges_costs_no_other_episode(monkeypatch, tmp_path):
+    """Any speed is called divergence here that some seeds reach, and others do not."""
+    untouched = evaluate(Hurries(), TASK, range(6), workers=0)
+    monkeypatch.setattr("tasks.engine.divergence.WARNS", 0.14)
+    monkeypatch.setattr("tasks.engine.divergence.REFUSES", 0.14)
+    alone = evaluate(Hurries(), TASK, range(6), workers=0)
+    assert 0 < len(alone.reasons) < 6
+    for seed in range(6):
+        if seed in alone.reasons:
+            assert 0 < alone.lengths[seed] < untouched.lengths[seed]
+        else:
+            assert alone.scores[seed] == untouched.scores[seed]
+    receipt = tmp_path / "receipt.json"
+    together = evaluate(Hurries(), TASK, range(6), workers=0, num_envs=3, receipt=receipt)
+    assert together.scores == alone.scores
+    assert verify(receipt, InProcessExecutor(), policy=Hurries()).equal
+    summary = record(TASK, range(6), tmp_path / "recorded", policy=Hurries(), workers=0)
+    assert {*summary.failed} == {*alone.reasons}

@@ -28,6 +28,7 @@ from robot_layouts.data.playing.together import (
     play_together,
     states_together,
 )
+from robots import DivergedError
 from tasks.episode import Score, States
 
 BYTES = 2  # of a digest that are kept of each moment
@@ -229,8 +230,18 @@ class EvaluationJob(EpisodesJob):
 
 class _EvaluationPlay(EpisodesPlay[EvaluationJob]):
     def __call__(self, seed: int) -> dict[int, Score]:
-        """Play the episodes of a seed and of those that are played together with it."""
-        players = [self._casting(seed) for seed in self._job.together[seed]]
+        """Play the episodes of a seed and of those that are played together with it.
+
+        Where physics diverges in one of several, each is played alone.
+        """
+        seeds = self._job.together[seed]
+        try:
+            return self._play(seeds)
+        except DivergedError:
+            return {seed: self._play([seed])[seed] for seed in seeds}
+
+    def _play(self, seeds: Sequence[int]) -> dict[int, Score]:
+        players = [self._casting(seed) for seed in seeds]
         for player in players:
             player.most = min(player.most, self._job.most_steps.get(player.seed, player.most))
         with torch.no_grad():

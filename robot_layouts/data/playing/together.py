@@ -37,7 +37,7 @@ from robot_layouts.data.playing.served.client import PolicyClient
 from robot_layouts.data.playing.shared_policy import SharedPolicy
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.registry import Expert
-from robots import ActionError, TaskError
+from robots import ActionError, DivergedError, TaskError
 from tasks import MultiRobotTask, Scenario, TaskEnv
 from tasks.arrays import row_of, stacked
 from tasks.engine.actions import ActionReader
@@ -79,6 +79,7 @@ class EpisodePlayer:
         to_the_end: Whether it plays all its steps, those after a success or out of time included.
         takeover: May act in place of the policy: obs → action, or None to let the policy act.
         corrector: Says at every step what it would do: obs → action.
+        diverged: What happened when physics diverged, which ends its episode.
         rehearsed: Its episode, if that has happened already, in the rehearsal of its plan; then
             there is nothing left to play.
         choices: The choice of each step so far.
@@ -94,6 +95,7 @@ class EpisodePlayer:
     to_the_end: bool = False
     takeover: Policy | None = None
     corrector: Policy | None = None
+    diverged: DivergedError | None = None
     rehearsed: PlayedEpisode | None = None
     choices: list[ChosenAction] = field(default_factory=list[ChosenAction])
     moments: list[StepResult] = field(default_factory=list[StepResult])
@@ -101,7 +103,7 @@ class EpisodePlayer:
     @property
     def over(self) -> bool:
         """Whether its episode is over."""
-        if len(self.moments) >= self.most:
+        if len(self.moments) >= self.most or self.diverged is not None:
             return True
         ended = bool(self.moments) and (self.moments[-1].terminated or self.moments[-1].truncated)
         return ended and not self.to_the_end
@@ -111,9 +113,9 @@ class EpisodePlayer:
         """How its episode went."""
         if self.rehearsed is not None:
             return self.rehearsed.score
-        success = bool(self.moments) and self.moments[-1].success
+        success = bool(self.moments) and self.moments[-1].success and self.diverged is None
         total = fsum(moment.reward for moment in self.moments)
-        reason = "" if success else self.reason
+        reason = "" if success else str(self.diverged or self.reason)
         stage = self.moments[-1].stage_score if self.moments else None
         return Score(success, total, len(self.moments), reason, waits_of(self.policy), stage)
 
@@ -129,7 +131,10 @@ class EpisodePlayer:
 
         Raises:
             TaskError: If it took no step.
+            DivergedError: If physics diverged in it.
         """
+        if self.diverged is not None:
+            raise self.diverged
         if not self.moments:
             raise TaskError(self.reason or "an episode needs at least one action")
         corrections = [c.correction for c in self.choices if c.correction is not None]
@@ -198,6 +203,7 @@ def record_together(
 
     Raises:
         TaskError: Also if a player takes no step.
+        DivergedError: Also if there is one player alone.
     """
     acting = players if observed else _acting(players)
     happened = _played(env, acting, observed=observed)
@@ -252,7 +258,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
 
     Every player sees its own environment alone, and draws from generators that are its own, so
     that nothing depends on who plays beside it. A policy that is marked as `batched` is called
-    once for all of them.
+    once for all of them. Where physics diverges, the episode of a player that plays alone is over.
 
     Args:
         env: The task, with at least as many environments as players.
@@ -265,6 +271,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
     Raises:
         BatchError: If the actions of a batched policy are not one for each environment.
         ActionError: If an action has the wrong shape or numbers that are not finite.
+        DivergedError: If physics diverges and there are several players: the step is lost for all.
     """
     ids = list(range(len(players)))
     observation, _ = env.reset([player.seed for player in players], REBUILT, ids)
@@ -278,9 +285,15 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
             actions[i] = choice.action
         everywhere = len(running) == env.num_envs
         began = perf_counter()
-        observation, rewards, terminated, truncated, info = env.step(
-            actions, None if everywhere else running
-        )
+        try:
+            observation, rewards, terminated, truncated, info = env.step(
+                actions, None if everywhere else running
+            )
+        except DivergedError as error:
+            if len(players) > 1:
+                raise
+            players[0].diverged = error
+            return
         seconds = (perf_counter() - began) / len(running)
         columns = (rewards, info["success"], terminated, truncated)
         rows = list(zip(*(column.tolist() for column in columns), strict=True))
@@ -463,7 +476,7 @@ class Casting:
         """Return what carries out the expert's plan; nothing if it finds none."""
         try:
             plan = planner(seed)
-        except TaskError as error:
+        except (TaskError, DivergedError) as error:
             return EpisodePlayer(seed, open_loop(()), 0, random_states(), str(error))
         to_the_end = self._cast.to_the_end
         states, reason = random_states(), planner.reason
