@@ -8,7 +8,7 @@ from typing import Annotated
 
 from robot_layouts.core.bounds import FAR, checked_number, expect_unit
 from robot_layouts.core.errors import SimulationError
-from robot_layouts.core.schema import check_fields, within
+from robot_layouts.core.schema import check_fields, whole, within
 from robots.descriptor import IDENTITY, Quaternion
 from robots.urdf.mesh_files import has_volume
 
@@ -228,11 +228,13 @@ class Floor(Shape):
         texture: Image file.
         size: Length of its sides (m), a whole number.
         tile: Length of the texture's sides (m).
+        mipmaps: How many sizes of the texture there are, each half as large as the one before.
     """
 
     texture: Path | str
     size: Annotated[int, within(1, FAR, "m", "whole number")] = 100
     tile: Length = 4.0
+    mipmaps: Annotated[int, whole(1, 16)] = 4
     collides: bool = field(default=False, kw_only=True)
 
 

@@ -20,6 +20,7 @@ from robot_layouts.simulation import (
     Sphere,
     State,
     World,
+    add_ground,
     add_table,
 )
 from robot_layouts.simulation.state import once_per_state
@@ -35,8 +36,10 @@ from tasks.language.bodies import (
     Cube,
     Cuboid,
     Goal,
+    Ground,
     Object,
     Peg,
+    Scene,
     Table,
     Target,
     WideTable,

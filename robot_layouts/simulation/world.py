@@ -372,13 +372,29 @@ def add_table(world: World, *, textured: bool = True) -> None:
         quaternion=TABLE_QUATERNION,
         anchored=True,
     )
+    add_ground(world, GROUND_HEIGHT)
+
+
+def add_ground(world: World, height: float = 0.0, *, mipmaps: int = 4) -> None:
+    """Add ManiSkill's ground: an infinite plane, drawn as a square of 100 m with a texture.
+
+    Args:
+        world: The world.
+        height: Of the plane (m).
+        mipmaps: How many sizes of the texture there are; see `objects.shapes.Floor`.
+
+    Raises:
+        AssetError: If the world has visuals and the texture cannot be found.
+    """
+    drawn = world.visuals
     plane = Plane(
-        position=(0.0, 0.0, GROUND_HEIGHT),
+        position=(0.0, 0.0, height),
         quaternion=(0.7071068, 0.0, -0.7071068, 0.0),  # plane normal +x turned to +z
         color=(0.35, 0.37, 0.4, 1.0),
         visible=not drawn,
     )
-    world.add("ground", plane, *(_floor() if drawn else ()), kind="static")
+    floor = _floor(height, mipmaps) if drawn else ()
+    world.add("ground", plane, *floor, kind="static")
 
 
 def _table_mesh(*, textured: bool) -> tuple[Shape]:
@@ -393,7 +409,7 @@ def _table_mesh(*, textured: bool) -> tuple[Shape]:
     return (mesh,)
 
 
-def _floor() -> tuple[Shape]:
+def _floor(height: float, mipmaps: int) -> tuple[Shape]:
     # mani_skill 3.0.1, utils/building/ground.py
     texture = GROUND_TEXTURE.locate()
-    return (Floor(texture=texture, position=(0.0, 0.0, GROUND_HEIGHT)),)
+    return (Floor(texture=texture, position=(0.0, 0.0, height), mipmaps=mipmaps),)

@@ -10,6 +10,8 @@ from robot_layouts.core.paths import absolute
 
 # What stands around robots in pictures; physics needs none of it.
 SCENERY = "maniskill_tabletop"  # a package of the manifest
+# What ManiSkill's humanoids handle; likewise.
+HUMANOID_THINGS = "maniskill_humanoid_things"
 
 
 @dataclass(frozen=True)
@@ -112,3 +114,8 @@ def opened_path(path: str | os.PathLike[str], folder: str | os.PathLike[str] | N
 
 TABLE = FileLocator(SCENERY, "scene_builder/table/assets/table.glb")
 GROUND_TEXTURE = FileLocator(SCENERY, "building/assets/grid_texture.png")
+CARDBOARD_BOX = FileLocator(HUMANOID_THINGS, "cardboard_box/textured.obj")  # with these two:
+CARDBOARD_BOX_LOOKS = (
+    FileLocator(HUMANOID_THINGS, "cardboard_box/box.mtl"),
+    FileLocator(HUMANOID_THINGS, "cardboard_box/01.png"),
+)
