@@ -99,9 +99,7 @@ CATALOGUE = {
     "TwoRobotPickCube-v1": "tasks.maniskill.two_robot_pick_cube:TwoRobotPickCube",
     "TwoRobotPushPick-v1": "tasks.originals.two_robot_push_pick:TwoRobotPushPick",
     "TwoRobotStackCube-v1": "tasks.maniskill.two_robot_stack_cube:TwoRobotStackCube",
-    "UnitreeG1TransportBox-v1": (
-        "tasks.maniskill.unitree_g1_transport_box:UnitreeG1TransportBox"
-    ),
+    "UnitreeG1TransportBox-v1": ("tasks.maniskill.unitree_g1_transport_box:UnitreeG1TransportBox"),
 }
 
 TaskClass = TypeVar("TaskClass", bound="type[MultiRobotTask]")

@@ -204,7 +204,8 @@ class Task:
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Place the task's bodies for a new episode; the robots are placed already."""
         for name, body in self.bodies.items():
-            body.place(world, name, rng)
+            if isinstance(body, Body):
+                body.place(world, name, rng)
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Return ``success`` (N,) bool and whatever else describes the state.

@@ -470,10 +470,7 @@ class Scene(ABC):
 
     @abstractmethod
     def add_to(self, world: World, name: str) -> None:
-        """Build it."""
-
-    def place(self, world: World, name: str, rng: EpisodeRandom) -> None:
-        """Leave it where it is: every reset puts it back."""
+        """Build it; every reset finds it where it is."""
 
 
 @dataclass(frozen=True)

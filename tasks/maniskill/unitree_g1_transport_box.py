@@ -27,7 +27,8 @@ from tasks.maths import Array, Flags, Floats, abs, norm, sum, tanh, where
 
 # mani_skill 3.0.1, envs/tasks/humanoid/transport_box.py (m, rad)
 ROBOT = "unitree_g1_simplified_upper_body_with_head_camera"
-TORSO, LEFT_ROLL, RIGHT_ROLL = "torso_joint", "left_shoulder_roll_joint", "right_shoulder_roll_joint"
+TORSO = "torso_joint"
+LEFT_ROLL, RIGHT_ROLL = "left_shoulder_roll_joint", "right_shoulder_roll_joint"
 RAISED = 1.25  # of the shoulders' rolls, outward, when an episode begins
 TABLE_HALF_SIZE = (1.658057143 / 2, 0.829028571 / 2, 0.630612274 / 2)
 TABLE_Y = 0.66  # of the goal's table; the box stands on the other one, at -TABLE_Y

@@ -232,7 +232,10 @@ class TestNeeds:
         with pytest.raises(TaskError, match=r"Lift.needs names 'left'; the places are \['arm'\]"):
             check_needs("Lift", layout, layout, {"left": Needs()})
 
-    @pytest.mark.parametrize("fields", [{"opening": -1}, {"reach": float("nan")}, {"fingers": 1}, {"joints": "waist"}])
+    @pytest.mark.parametrize(
+        "fields",
+        [{"opening": -1}, {"reach": float("nan")}, {"fingers": 1}, {"joints": "waist"}],
+    )
     def test_that_nobody_can_have(self, fields):
         with pytest.raises(TaskError):
             Needs(**fields)

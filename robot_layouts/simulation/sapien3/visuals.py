@@ -140,9 +140,7 @@ def _floor(shape: Floor) -> RenderShapeTriangleMesh:
     beside, ahead = corner + 1, corner + shape.size + 1
     triangles = [(corner, ahead, beside), (ahead, ahead + 1, beside)]
     material = RenderMaterial()
-    material.base_color_texture = RenderTexture2D(
-        str(shape.texture), mipmap_levels=shape.mipmaps
-    )
+    material.base_color_texture = RenderTexture2D(str(shape.texture), mipmap_levels=shape.mipmaps)
     return RenderShapeTriangleMesh(
         vertices=places,
         triangles=np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in triangles]),
