@@ -18,10 +18,16 @@ from robot_layouts.core.files import read_regular, read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
 from robot_layouts.core.writing import write_whole
 from robots.assets.locator import (
+    APPLE,
+    APPLE_BODY,
+    BOWL,
+    BOWL_BODY,
     CARDBOARD_BOX,
     CARDBOARD_BOX_LOOKS,
     GROUND_TEXTURE,
     HUMANOID_THINGS,
+    KITCHEN,
+    KITCHEN_COUNTER,
     SCENERY,
     TABLE,
     FileLocator,
@@ -65,8 +71,9 @@ SCENES: dict[str, tuple[str, tuple[FileLocator, ...]]] = {
     SCENERY: ("mani_skill/utils", (TABLE, GROUND_TEXTURE)),
     HUMANOID_THINGS: (
         "mani_skill/envs/tasks/humanoid/assets",
-        (CARDBOARD_BOX, *CARDBOARD_BOX_LOOKS),
+        (APPLE, APPLE_BODY, BOWL, BOWL_BODY, CARDBOARD_BOX, *CARDBOARD_BOX_LOOKS),
     ),
+    KITCHEN: ("mani_skill/utils/scene_builder/kitchen_counter/assets", (KITCHEN_COUNTER,)),
 }
 ON_HUB = (SCENERY,)  # of these
 

@@ -73,6 +73,10 @@ TASKS: Mapping[str, tuple[Callable[[], Layout], str]] = {
     "StackPyramid-v1": (_panda_wristcam, TABLE),
     "TwoRobotPickCube-v1": (partial(_two, "panda_wristcam", 1.5), TABLE),
     "TwoRobotStackCube-v1": (partial(_two, "panda_wristcam", 1.5), TABLE),
+    "UnitreeG1PlaceAppleInBowl-v1": (
+        partial(_g1, (-0.3, 0.0, 0.755), keyframe="standing"),
+        "envs/tasks/humanoid/humanoid_pick_place.py",
+    ),
     "UnitreeG1TransportBox-v1": (
         partial(_g1, (-0.1, 0.0, 0.755), qpos=(0.0, 0.0, 0.0, 1.25, -1.25, *(0.0,) * 20)),
         "envs/tasks/humanoid/transport_box.py",

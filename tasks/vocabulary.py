@@ -37,6 +37,7 @@ from tasks.language.bodies import (
     Cuboid,
     Goal,
     Ground,
+    KitchenCounter,
     Object,
     Peg,
     Scene,

@@ -90,7 +90,7 @@ _NEEDED: dict[str, tuple[Callable[[Any], bool], str]] = {
     ),
     "table": (
         lambda given: isinstance(given, Scene),
-        "a tasks.Table, WideTable or Ground is needed, and other bodies go by other names",
+        "a tasks.Scene is needed, such as tasks.Table(), and other bodies go by other names",
     ),
 }
 """What an attribute must be: whether it is, and in words."""

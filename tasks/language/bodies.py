@@ -31,6 +31,7 @@ from tasks.language.props import (
     GREEN,
     RED,
     TARGET_HEIGHT,
+    add_kitchen_counter,
     add_wide_table,
     peg_shapes,
     target_shapes,
@@ -459,7 +460,7 @@ class Target(Body):
 
 @dataclass(frozen=True)
 class Scene(ABC):
-    """What robots stand in, under a task's ``table``: `Table`, `WideTable` or `Ground`."""
+    """What robots stand in, under a task's ``table``: a table, a counter, or nothing but ground."""
 
     def outline(self, layout: Layout) -> Rectangle | None:
         """Return the outline of a table's top at z = 0: x_min, y_min, x_max, y_max (m).
@@ -534,6 +535,29 @@ class Ground(Scene):
     def add_to(self, world: World, name: str) -> None:
         """Build it; its body is called ``ground``."""
         add_ground(world, mipmaps=self.mipmaps)
+
+
+@dataclass(frozen=True)
+class KitchenCounter(Scene):
+    """ManiSkill's kitchen counter with a sink, and the floor at z = 0.
+
+    Attributes:
+        scale: How much larger it is than its file.
+    """
+
+    scale: Factor = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no scale.
+
+        Raises:
+            TaskError: If ``scale`` is no number, or out of bounds.
+        """
+        check_fields(self, TaskError)
+
+    def add_to(self, world: World, name: str) -> None:
+        """Build it; its body is called ``kitchen-counter``."""
+        add_kitchen_counter(world, self.scale)
 
 
 Declared: TypeAlias = Body | Scene
