@@ -28,7 +28,7 @@ from tasks.maths import Array, Floats, abs, floats, mean, norm, tanh, where
 ROBOT = "unitree_g1_simplified_upper_body_with_head_camera"
 SCALE = 0.82  # of counter and bowl
 APPLE_SCALE = SCALE * 0.8
-SPREAD = 0.025  # of apple and bowl, along x and y
+SPAWN = ((-0.025, -0.025), (0.025, 0.025))  # of apple and bowl: lowest, highest x and y
 APPLE_HEIGHT, BOWL_HEIGHT = 0.7335, 0.753
 BOWL_Y = -0.4
 APPLE_START, BOWL_START = (0.0, BOWL_Y, 0.78), (0.0, BOWL_Y, BOWL_HEIGHT)
@@ -83,9 +83,9 @@ class UnitreeG1PlaceAppleInBowl(Clone):
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the apple on the counter, and stand the bowl to its right."""
-        x, y = rng.uniform(1, 2)[0] * (2 * SPREAD) - SPREAD
+        x, y = rng.uniform_between(*SPAWN)
         world.set_pose("apple", (x.item(), y.item(), APPLE_HEIGHT), rng.yaw_quaternion())
-        x, y = rng.uniform(1, 2)[0] * (2 * SPREAD) - SPREAD
+        x, y = rng.uniform_between(*SPAWN)
         world.set_pose("bowl", (x.item(), (y + BOWL_Y).item(), BOWL_HEIGHT))
 
     def evaluate(self, state: State) -> dict[str, Array]:

@@ -36,7 +36,8 @@ TABLE_SCALE, BOX_SCALE = 1.2, 0.12  # of the files
 BOX_HALF_SIZE = (0.18, 0.12, 0.12)
 BOX_DENSITY = 200.0  # kg/m³
 BOX_START = (-0.1, -0.37, 0.7508)
-BOX_X, BOX_Y, BOX_YAW = (-0.05, 0.2), (-0.05, 0.05), (0.0, pi / 6)  # from BOX_START
+BOX_SPAWN = ((-0.05, -0.05), (0.2, 0.05))  # lowest, highest x and y from BOX_START
+BOX_YAW = (0.0, pi / 6)
 GRASP_POINTS = {"left": ((0.165, 0.07, 0.05),), "right": ((-0.165, 0.07, 0.05),)}  # of the box
 ABOVE_POINT = 0.04  # that a hand may be, and grasp
 PALM = ("five_link", "three_link", "palm_link")  # of a hand, which press on the box
@@ -91,7 +92,7 @@ class UnitreeG1TransportBox(Clone):
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Stand the box on the right table."""
-        x, y = (rng.uniform(1) * (high - low) + low for low, high in (BOX_X, BOX_Y))
+        x, y = rng.uniform_between(*BOX_SPAWN)
         place = ((x + BOX_START[0]).item(), (y + BOX_START[1]).item(), BOX_START[2])
         world.set_pose("box", place, rng.yaw_quaternion(*BOX_YAW))
 
