@@ -317,6 +317,11 @@ class World:
                     " Capsule, ConvexHull, Mesh and Plane"
                 )
         checked_choice(f"body {name!r}: kind", kind, _KINDS, SimulationError)
+        if kind == "dynamic" and any(map(_is_surface, shapes)):
+            raise SimulationError(
+                f"body {name!r} is dynamic, and the surface of a mesh collides; of a body that"
+                " physics moves, its 'hull' or 'pieces' do (a Mesh's collision)"
+            )
 
     def _pose(self, body: str, position: Any, quaternion: Any) -> list[float]:
         place = self._floats(position, 3, f"position of body {body!r}", "m")
@@ -342,6 +347,10 @@ class World:
             f"{what} in environment {self._number} is {shown(values)}; it must be {count} finite"
             f" numbers ({unit})"
         )
+
+
+def _is_surface(shape: object) -> bool:
+    return isinstance(shape, Mesh) and shape.collides and shape.collision == "surface"
 
 
 def add_table(world: World, *, textured: bool = True) -> None:

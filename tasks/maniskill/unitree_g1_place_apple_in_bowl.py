@@ -68,9 +68,7 @@ class UnitreeG1PlaceAppleInBowl(Clone):
     max_reward = 10
     viewpoint = ((0.279123, 0.303438, 1.34794), (-0.222864, -0.012452, 0.671018))
     cameras = (
-        Camera(
-            (0.279123, 0.303438, 1.34794), quaternion=(0.252428, 0.396735, 0.114442, -0.875091)
-        ),
+        Camera((0.279123, 0.303438, 1.34794), quaternion=(0.252428, 0.396735, 0.114442, -0.875091)),
     )
     sensed = ("is_grasped", "tcp_pose")
 
