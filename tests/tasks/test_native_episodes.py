@@ -18,6 +18,8 @@ SEEDS = (*range(2, 8), 2**31 - 1, 2**32 - 1)
 OTHER_NOISE = {
     "DrawTriangle-v1": "native starts it without joint noise",
     "PlugCharger-v1": "native draws its joint noise from torch's global stream",
+    "UnitreeG1PlaceAppleInBowl-v1": "native starts it without joint noise",
+    "UnitreeG1TransportBox-v1": "native starts it without joint noise",
 }
 
 
