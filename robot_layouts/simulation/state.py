@@ -259,6 +259,10 @@ class State:
         """Position of a link, shape (N, 3) (m)."""
         return self.all_poses[self._index.links[robot][link], :, :3]
 
+    def link_poses(self, robot: str, links: Iterable[str]) -> Floats:
+        """Poses of links one after the other, shape (N, 7 · links)."""
+        return concatenate([self.link_pose(robot, link) for link in links], 1)
+
     def base_pose(self, robot: str) -> Floats:
         """Pose of a robot's root link, shape (N, 7)."""
         return self.all_poses[self._index.bases[robot]]
