@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields as fields_of
 from dataclasses import replace
@@ -111,6 +112,9 @@ TaskClass = TypeVar("TaskClass", bound="type[MultiRobotTask]")
 _listeners: list[Callable[[Iterable[str]], None]] = []
 
 
+_WORD_ENDS = re.compile("(?<=[a-z])(?=[A-Z])")
+
+
 def _native_name(name: str) -> str:
     return f"maniskill.{name}_native"
 
@@ -136,7 +140,7 @@ TASKS = Catalogue(
     check=_check,
     error=TaskError,
     aliases={
-        _native_name(target.partition(":")[0].removeprefix(CLONES)): task_id
+        _native_name(_WORD_ENDS.sub("_", task_id.partition("-v")[0]).lower()): task_id
         for task_id, target in CATALOGUE.items()
         if target.startswith(CLONES)
     }
