@@ -173,8 +173,7 @@ class ParallelTask(OneEnvironment, ParallelEnv[str, Observation, NDArray[np.floa
             return [
                 np.arange(part.start, part.stop)
                 for key, part in slices.items()
-                if key.startswith(besides[robot])
-                or not (key in joints or key.startswith(owned))
+                if key.startswith(besides[robot]) or not (key in joints or key.startswith(owned))
             ]
 
         return {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, pi
+from math import pi, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -42,9 +42,8 @@ MOUNT_WIDTH, MOUNT_HEIGHT = 0.04, 0.03
 AXIS_HEIGHT = SPOKE_HEIGHT + MOUNT_HEIGHT
 BEARING_RADIUS, BEARING_HEIGHT = 0.007, 0.032
 FACTOR_SPREAD = 0.1  # standard deviation of the factors on length and radius of spokes
-LENGTH = hypot(0.707, 0.707)  # of native's quaternions, which PhysX scales to length 1
-ON_END: Quaternion = (-0.707 / LENGTH, 0.0, 0.707 / LENGTH, 0.0)
-AXES: Quaternion = (0.707 / LENGTH, 0.0, 0.707 / LENGTH, 0.0)
+ON_END: Quaternion = (-0.707, 0.0, 0.707, 0.0)  # native's digits: pictures depend on its length
+DOWN: Quaternion = (sqrt(0.5), 0.0, sqrt(0.5), 0.0)  # native's 0.707, as PhysX scales it
 RUBBER = Friction(1.0, 0.8, 0.0)
 SATIN = Finish(roughness=0.5, specular=0.5)
 RED: Color = (1.0, 0.0, 0.0, 1.0)
@@ -121,7 +120,7 @@ class ValveDesign:
             kind="turn",
             parts=self.spokes(),
             axis=(0.0, 0.0, -1.0),
-            axes=AXES,
+            axes=DOWN,
             at=(0.0, 0.0, AXIS_HEIGHT),
             origin=(0.0, 0.0, AXIS_HEIGHT),
             lower=None,
