@@ -19,6 +19,7 @@ from robot_layouts.simulation.maths import (
     Floats,
     concatenate,
     counted,
+    doubles,
     full,
     like,
     norm,
@@ -142,6 +143,10 @@ class State:
                 be changed.
         """
         return like(self.joint_positions, values)
+
+    def doubles(self, values: Sequence[Any]) -> Array:
+        """Return numbers as an array of its own, float64: where native's are."""
+        return doubles(self.joint_positions, values)
 
     def full(self, value: float) -> Array:
         """Return a number or a flag for every environment, shape (N,)."""

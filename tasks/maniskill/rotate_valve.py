@@ -230,7 +230,7 @@ class RotateValve(Clone):
         return {
             "start": state.joint(VALVE, TURN),
             "direction": state.array([world.notes["direction"] for world in worlds]),
-            "lengths": np.array([world.design.length for world in worlds]),  # float64, as native's
+            "lengths": state.doubles([world.design.length for world in worlds]),
         }
 
     def evaluate(self, state: State) -> dict[str, Array]:
