@@ -32,7 +32,8 @@ class Joint:
         parts: The shapes that move.
         axis: Along which the part slides, or about which it turns; of length 1.
         at: A point on that axis (m).
-        lower: Where it stops; None if it turns without end, and then ``upper`` is None, too.
+        lower: Where it stops; None if it turns without end, and then ``upper`` is None, too. SAPIEN
+            keeps its position within 2π of zero.
         upper: Likewise.
         start: Where episodes begin with it.
         friction: Coefficient of dry friction, as that of a robot's joints.

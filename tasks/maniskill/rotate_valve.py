@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import pi, sqrt
 from typing import ClassVar
-
-import numpy as np
-import torch
-from numpy.typing import NDArray
 
 from layouts import Layout, Placement
 from layouts.placement import load_robot
@@ -34,6 +31,7 @@ from tasks import (
 )
 from tasks.maniskill.clone import Clone
 from tasks.maths import Array, Floats, clip, cos, norm, sin, tanh
+from tasks.native.rotations import about_z, along_ray
 
 # mani_skill 3.0.1, utils/building/articulations/robel.py (m)
 SPOKE_HEIGHT = 0.039854  # over the mount
@@ -96,7 +94,7 @@ class ValveDesign:
         return (self._spoke(first, RED), *(self._spoke(angle, WHITE) for angle in others))
 
     def _spoke(self, angle: float, color: Color) -> Capsule:
-        middle, quaternion = _turned(angle, self.length / 2)
+        middle, quaternion = along_ray(angle, self.length / 2)
         return Capsule(
             radius=self.radius,
             half_length=self.length / 2,
@@ -130,46 +128,27 @@ class ValveDesign:
         )
 
 
-def _turned(angle: float, distance: float) -> tuple[tuple[float, float], Quaternion]:
-    """Return a place on a ray from the origin, and how what lies along the ray is turned.
-
-    It rounds as SAPIEN does, in float32, with the C library's cosine and sine: NumPy's are others
-    unless they are those of a complex number.
-
-    Args:
-        angle: Of the ray, about z (rad).
-        distance: Along it (m).
-
-    Returns:
-        x and y (m), and a quaternion (wxyz).
-    """
-    half = np.exp(np.complex64(1j * float(np.float32(angle) / np.float32(2))))
-    cosine, sine, far = half.real, half.imag, np.float32(distance)
-    x = far * (cosine * cosine - sine * sine)
-    y = np.float32(2) * (sine * far) * cosine
-    return (float(x), float(y)), (float(cosine), 0.0, 0.0, float(sine))
-
-
-def drawn_angles(count: int, numpy: np.random.RandomState) -> tuple[float, ...]:
+def drawn_angles(count: int, rng: EpisodeRandom) -> tuple[float, ...]:
     """Draw where spokes point, rising (rad).
 
-    No two are nearer than 30°, and no other one is nearer to a full turn; of spokes for which no
-    such angles are found in 500 trials, the angles are even.
+    No two are nearer than 30°, and the last one is as far from a full turn; of spokes for which no
+    such angles are found in 500 trials, the gaps are equal.
 
     Args:
         count: Number of spokes.
-        numpy: The environment's stream.
+        rng: Draws them from its numpy stream.
     """
     for _ in range(TRIALS):
-        angles: NDArray[np.float64] = np.sort(numpy.uniform(0, np.pi * 2, (count,)))
-        if np.diff(angles, append=np.pi * 2).min() >= LEAST_GAP:
-            return tuple(angles.tolist())
+        angles = sorted(rng.numpy.uniform(0, 2 * pi, count).tolist())
+        gaps = (after - angle for angle, after in pairwise((*angles, 2 * pi)))
+        if min(gaps) >= LEAST_GAP:
+            return tuple(angles)
     return even_angles(count)
 
 
 def even_angles(count: int) -> tuple[float, ...]:
     """Return where so many spokes point if the gaps are equal (rad)."""
-    return tuple(np.arange(0, np.pi * 2, np.pi * 2 / count).tolist())
+    return tuple(i * (2 * pi / count) for i in range(count))
 
 
 class RotateValve(Clone):
@@ -198,7 +177,7 @@ class RotateValve(Clone):
 
     def design(self, rng: EpisodeRandom) -> ValveDesign:
         """Draw three to five spokes."""
-        return ValveDesign(drawn_angles(rng.numpy.randint(*SPOKES), rng.numpy))
+        return ValveDesign(drawn_angles(rng.numpy.randint(*SPOKES), rng))
 
     def direction(self, rng: EpisodeRandom) -> float:
         """Return which way the valve is to be turned: 1 where its joint's position rises, or -1."""
@@ -217,7 +196,7 @@ class RotateValve(Clone):
         """Stand the valve on the table, turned by any angle, and then the fingers over it."""
         world.notes["direction"] = self.direction(rng)
         x, y = rng.torch_uniform(-HALF_SPAWN, HALF_SPAWN, 2).tolist()
-        world.set_pose(VALVE, (x, y, 0.0), _yaw(rng.torch_uniform(*YAW, 1)))
+        world.set_pose(VALVE, (x, y, 0.0), about_z(rng.torch_uniform(*YAW, 1)))
         angle = rng.uniform(1, 1) * pi * 2 - pi
         world.set_joints(VALVE, **{TURN: angle.item()})
         for name, placement in world.layout.items():
@@ -264,18 +243,6 @@ class RotateValve(Clone):
         speed = state.joint_velocity(VALVE, TURN) * self.memory.direction
         turned = clip(info["valve_rotation"] / pi / 2.0, -1.0, 1.0)
         return 1.0 - tanh(error * 10.0) + tanh(5.0 * speed) * 4.0 + turned
-
-
-def _yaw(angle: torch.Tensor) -> torch.Tensor:
-    """Return a rotation about z, wxyz (4,), by the operations of ``axis_angle_to_quaternion``.
-
-    Args:
-        angle: Shape (1,), more than 0 (rad).
-    """
-    turn = torch.cat((torch.zeros(2), angle))
-    size = torch.linalg.vector_norm(turn, dim=-1, keepdim=True)
-    half = size * 0.5
-    return torch.cat((torch.cos(half), turn * (torch.sin(half) / size)))
 
 
 @register_task("RotateValveLevel0-v1", "maniskill.rotate_valve_level0_native")

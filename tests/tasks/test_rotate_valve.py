@@ -20,13 +20,15 @@ def designs(env: tasks.TaskEnv) -> list[ValveDesign]:
 
 def test_spokes_are_apart():
     for seed in range(50):
-        angles = drawn_angles(5, np.random.RandomState(seed))
+        angles = drawn_angles(5, tasks.EpisodeRandom(seed))
         assert angles[0] >= 0
         assert np.diff(angles, append=2 * pi).min() >= LEAST_GAP
 
 
 def test_spokes_for_which_no_angles_are_found_are_even():
-    assert drawn_angles(12, np.random.RandomState(0)) == even_angles(12)
+    assert drawn_angles(12, tasks.EpisodeRandom(0)) == even_angles(12)
+    for count in (3, 4, 5):
+        assert even_angles(count) == tuple(np.arange(0, 2 * pi, 2 * pi / count).tolist())
     assert even_angles(4) == pytest.approx((0.0, pi / 2, pi, pi * 3 / 2))
 
 
@@ -88,6 +90,16 @@ def test_it_is_solved_once_the_valve_has_turned_far_enough(task_id: str, turned:
         state["articulations"][VALVE][:, 13] += far
         env.set_state_dict(state)
         assert env.evaluate(env.state)["success"].tolist() == [solved]
+
+
+def test_beyond_a_full_turn_the_valve_is_a_full_turn_back_as_in_native():
+    env = tasks.make(LEVELS[0])
+    env.reset(seed=0)
+    state = env.get_state_dict()
+    state["articulations"][VALVE][:, 13:] = torch.tensor([6.28, 500.0])  # rad, rad/s
+    env.set_state_dict(state)
+    env.step(torch.zeros(1, 9))
+    assert -2 * pi < env.state.joint(VALVE, "valve")[0] < -6.2
 
 
 def test_rewards_are_doubles_as_natives_and_vectors_give_floats():
