@@ -72,6 +72,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "Friction",
     "Goal",
     "Info",
+    "Joint",
     "Light",
     "LogUniform",
     "Mesh",

@@ -175,7 +175,8 @@ class TaskEnv(Remade):
         )
         first = task.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
-        self._max_reward = np.array(task.max_reward, np.float32)
+        kept = np.float64 if task.double_rewards else np.float32
+        self._max_reward = np.array(task.max_reward, kept)
         self._elapsed = np.zeros(self.num_envs, np.int32)
         self._everywhere: Sequence[int] = range(self.num_envs)
         task.moving = self._everywhere
@@ -342,7 +343,7 @@ class TaskEnv(Remade):
 
         Returns:
             Observation, reward (N,) float32, terminated (N,), truncated (N,), info. An
-            environment terminates when it succeeds.
+            environment terminates when it succeeds. See `Task.double_rewards`.
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
@@ -494,7 +495,8 @@ class TaskEnv(Remade):
         self._judged = ReturnedArrays(f"{name}.evaluate()", count, judges=True)
         self._observed = ReturnedArrays(f"{name}.observe()", count, axes=2)
         self._remembered = ReturnedArrays(f"{name}.remember()", count)
-        self._rewards = ReturnedReward(f"{name}.dense_reward()", count)
+        double = self.task.double_rewards
+        self._rewards = ReturnedReward(f"{name}.dense_reward()", count, double=double)
 
     def _build_world(self, world: World, index: int) -> None:
         rng = self._rngs[index]
