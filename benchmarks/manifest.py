@@ -17,7 +17,22 @@ from robot_layouts.core.errors import AssetError
 from robot_layouts.core.files import read_regular, read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
 from robot_layouts.core.writing import write_whole
-from robots.assets.locator import GROUND_TEXTURE, SCENERY, TABLE, UrdfLocator
+from robots.assets.locator import (
+    APPLE,
+    APPLE_BODY,
+    BOWL,
+    BOWL_BODY,
+    CARDBOARD_BOX,
+    CARDBOARD_BOX_LOOKS,
+    GROUND_TEXTURE,
+    HUMANOID_THINGS,
+    KITCHEN,
+    KITCHEN_COUNTER,
+    SCENERY,
+    TABLE,
+    FileLocator,
+    UrdfLocator,
+)
 from robots.assets.manifest import (
     INDEX_PACKAGES,
     MANI_SKILL,
@@ -51,6 +66,16 @@ TERMS = {
     "Zlib": "zlib licence: do not claim to be the author, and say so where you change the files",
     "MPL-2.0": "Mozilla Public License 2.0: what you change in the files stays under it",
 }
+# Packages of files that belong to no robot: their folder in mani_skill's wheel, and which they are.
+SCENES: dict[str, tuple[str, tuple[FileLocator, ...]]] = {
+    SCENERY: ("mani_skill/utils", (TABLE, GROUND_TEXTURE)),
+    HUMANOID_THINGS: (
+        "mani_skill/envs/tasks/humanoid/assets",
+        (APPLE, APPLE_BODY, BOWL, BOWL_BODY, CARDBOARD_BOX, *CARDBOARD_BOX_LOOKS),
+    ),
+    KITCHEN: ("mani_skill/utils/scene_builder/kitchen_counter/assets", (KITCHEN_COUNTER,)),
+}
+ON_HUB = (SCENERY,)  # of these
 
 
 def manifest(*, check: bool = False) -> int:
@@ -89,9 +114,10 @@ def build_manifest() -> AssetManifest:
         if isinstance(locator, UrdfLocator):
             urdfs.setdefault(locator.package, set()).add(locator.file)
     packages = {name: _build_or_keep(name, urdfs[name]) for name in urdfs}
-    scenes = build_scenery(find_package(MANI_SKILL.name))
+    installed = find_package(MANI_SKILL.name)
+    scenes = {name: build_scenery(installed, name) for name in SCENES}
     things = {f"{package.prefix}objects": build_objects(package) for package in OBJECT_PACKAGES}
-    return AssetManifest({**packages, SCENERY: scenes, **things})
+    return AssetManifest({**packages, **scenes, **things})
 
 
 def to_json(manifest: AssetManifest) -> str:
@@ -130,18 +156,22 @@ def _build_or_keep(name: str, urdfs: set[str]) -> AssetPackage:
     return build_package(name, installed, urdfs)
 
 
-def build_scenery(installed: Path) -> AssetPackage:
-    """Return the package of what stands around robots in pictures.
+def build_scenery(installed: Path, name: str) -> AssetPackage:
+    """Return a package of what stands around robots, or is handled by them.
 
     Args:
         installed: Folder that mani_skill is installed in.
+        name: One of `SCENES`.
 
     Raises:
         AssetError: If mani_skill lacks one of its files.
     """
-    folder = installed / (inside := "mani_skill/utils")
-    origin = _origin(MANI_SKILL, SCENERY, inside, "scene", _licence(folder))
-    paths = sorted(locator.file for locator in (TABLE, GROUND_TEXTURE))
+    inside, locators = SCENES[name]
+    folder = installed / inside
+    origin = _origin(MANI_SKILL, name, inside, "scene", _licence(folder))
+    if name not in ON_HUB:
+        origin = replace(origin, hub_dataset=None, hub_folder=None)
+    paths = sorted(locator.file for locator in locators)
     return AssetPackage(origin, tuple(_asset_file(origin, folder, p, set(), set()) for p in paths))
 
 

@@ -15,6 +15,7 @@ from layouts.layout import Layout
 from layouts.placement import Placement
 from layouts.presets import face_to_face, single
 from robots import UnknownNameError
+from robots.descriptor import Vector3
 
 TABLE = "utils/scene_builder/table/scene_builder.py"
 ROTATE_VALVE = "envs/tasks/dexterity/rotate_valve.py"
@@ -27,6 +28,11 @@ def _one(robot: str, **place: object) -> Layout:
 
 def _two(robot: str, spacing: float) -> Layout:
     return face_to_face({"left": robot, "right": robot}, spacing=spacing)
+
+
+def _g1(position: Vector3, **place: object) -> Layout:
+    robot = "unitree_g1_simplified_upper_body_with_head_camera"
+    return Layout({"robot": Placement(robot, position, qpos_noise=0.0, **place)})  # type: ignore[arg-type]
 
 
 _panda = partial(single, {"arm": "panda"})
@@ -76,6 +82,14 @@ TASKS: Mapping[str, tuple[Callable[[], Layout], str]] = {
     "StackPyramid-v1": (_panda_wristcam, TABLE),
     "TwoRobotPickCube-v1": (partial(_two, "panda_wristcam", 1.5), TABLE),
     "TwoRobotStackCube-v1": (partial(_two, "panda_wristcam", 1.5), TABLE),
+    "UnitreeG1PlaceAppleInBowl-v1": (
+        partial(_g1, (-0.3, 0.0, 0.755), keyframe="standing"),
+        "envs/tasks/humanoid/humanoid_pick_place.py",
+    ),
+    "UnitreeG1TransportBox-v1": (
+        partial(_g1, (-0.1, 0.0, 0.755), qpos=(0.0, 0.0, 0.0, 1.25, -1.25, *(0.0,) * 20)),
+        "envs/tasks/humanoid/transport_box.py",
+    ),
 }
 
 

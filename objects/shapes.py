@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from robot_layouts.core.bounds import FAR, checked_number, expect_unit
 from robot_layouts.core.errors import SimulationError
-from robot_layouts.core.schema import check_fields, within
+from robot_layouts.core.schema import check_fields, whole, within
 from robots.descriptor import IDENTITY, Quaternion
 from robots.urdf.mesh_files import has_volume
 
@@ -24,6 +24,8 @@ Density = Annotated[float, within(1e-3, 1e6, "kg/m³")]
 Coordinate = Annotated[float, within(-FAR, FAR, "m")]
 Place = tuple[Coordinate, Coordinate, Coordinate]
 Factor = Annotated[float, within(1e-6, FAR)]
+
+MeshCollision = Literal["hull", "pieces", "surface"]
 
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 FEWEST_CORNERS, MOST_CORNERS = 4, 64  # of a hull; PhysX takes as many on any processor
@@ -214,16 +216,20 @@ class Plane(Shape):
 
 @dataclass(frozen=True)
 class Mesh(Shape):
-    """A mesh file; its convex hull collides.
+    """A mesh file.
 
     Attributes:
         file: Mesh file.
         scale: Scale along x, y, z.
+        collision: What of it collides: its convex ``"hull"``, the hulls of its ``"pieces"``, each a
+            part of the mesh that hangs together, or its very ``"surface"``, in a body that physics
+            does not move.
         textured: Whether it is drawn as its file says; else in ``color``, with the file's finish.
     """
 
     file: Path | str
     scale: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
+    collision: MeshCollision = "hull"
     textured: bool = False
 
 
@@ -235,11 +241,13 @@ class Floor(Shape):
         texture: Image file.
         size: Length of its sides (m), a whole number.
         tile: Length of the texture's sides (m).
+        mipmaps: How many sizes of the texture there are, each half as large as the one before.
     """
 
     texture: Path | str
     size: Annotated[int, within(1, FAR, "m", "whole number")] = 100
     tile: Length = 4.0
+    mipmaps: Annotated[int, whole(1, 16)] = 4
     collides: bool = field(default=False, kw_only=True)
 
 

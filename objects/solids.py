@@ -23,6 +23,7 @@ from robot_layouts.kinematics.rotations import (
     transform,
 )
 from robots.descriptor import Quaternion
+from robots.urdf.mesh_files import has_volume
 
 SIDES = 32  # of the polygon that stands for a circle where a surface is wanted
 _WHOLE = 1e9  # nanometres are whole numbers
@@ -316,7 +317,8 @@ def _surface(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
         case Box():
             return _BOX * shape.half_size, hull_triangles(tuple(map(tuple, _BOX.tolist())))
         case Mesh():
-            return _file(str(shape.file), shape.scale, shape.collides)
+            whole = shape.collides and shape.collision == "hull"
+            return _file(str(shape.file), shape.scale, whole)
         case _:
             return _round(shape)
 
@@ -339,13 +341,38 @@ def _round(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
 
 
 @lru_cache(maxsize=64)
-def _file(file: str, scale: Place, collides: bool) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the surface of a mesh file; of one that collides its convex hull, which does so."""
+def _file(file: str, scale: Place, hull: bool) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the surface of a mesh file, or of its convex hull."""
+    import trimesh
+
+    loaded = _loaded(file)
+    found: Any = trimesh.convex.convex_hull(loaded) if hull else loaded
+    return np.asarray(found.vertices, float) * scale, np.asarray(found.faces, np.intp)
+
+
+@lru_cache(maxsize=64)
+def pieces(file: str, scale: Place) -> tuple[Floats, ...]:
+    """Return the corners, (n, 3) (m), of each piece of a mesh file that hangs together.
+
+    Pieces without a volume are left out.
+
+    Args:
+        file: The file.
+        scale: Factors along x, y and z.
+
+    Raises:
+        DescriptorError: If it cannot be read as a mesh.
+    """
+    mesh = _loaded(file)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    parts = (np.asarray(part.vertices, float) for part in mesh.split(only_watertight=False))
+    return tuple(corners * scale for corners in parts if has_volume(corners * scale))
+
+
+def _loaded(file: str) -> Any:
     import trimesh
 
     try:
-        loaded: Any = trimesh.load(file, force="mesh")
-        found: Any = trimesh.convex.convex_hull(loaded) if collides else loaded
+        return trimesh.load(file, force="mesh")
     except Exception as error:  # whatever the reader of this format raises
         raise DescriptorError(f"{file} cannot be read as a mesh: {error}") from error
-    return np.asarray(found.vertices, float) * scale, np.asarray(found.faces, np.intp)

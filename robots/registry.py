@@ -42,6 +42,7 @@ NAMES = (
     "tiago_pro",
     "trifingerpro",
     "unitree_g1",
+    "unitree_g1_simplified_upper_body_with_head_camera",
     "unitree_g1_upper_body",
     "unitree_g1_upper_body_head_camera",
     "unitree_g1_upper_body_right_arm",

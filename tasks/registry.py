@@ -105,6 +105,10 @@ CATALOGUE = {
     "TwoRobotPickCube-v1": "tasks.maniskill.two_robot_pick_cube:TwoRobotPickCube",
     "TwoRobotPushPick-v1": "tasks.originals.two_robot_push_pick:TwoRobotPushPick",
     "TwoRobotStackCube-v1": "tasks.maniskill.two_robot_stack_cube:TwoRobotStackCube",
+    "UnitreeG1PlaceAppleInBowl-v1": (
+        "tasks.maniskill.unitree_g1_place_apple_in_bowl:UnitreeG1PlaceAppleInBowl"
+    ),
+    "UnitreeG1TransportBox-v1": ("tasks.maniskill.unitree_g1_transport_box:UnitreeG1TransportBox"),
 }
 
 TaskClass = TypeVar("TaskClass", bound="type[MultiRobotTask]")

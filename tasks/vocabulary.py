@@ -21,6 +21,7 @@ from robot_layouts.simulation import (
     Sphere,
     State,
     World,
+    add_ground,
     add_table,
 )
 from robot_layouts.simulation.state import once_per_state
@@ -36,8 +37,11 @@ from tasks.language.bodies import (
     Cube,
     Cuboid,
     Goal,
+    Ground,
+    KitchenCounter,
     Object,
     Peg,
+    Scene,
     Table,
     Target,
     WideTable,

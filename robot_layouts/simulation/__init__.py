@@ -16,7 +16,7 @@ from robot_layouts.simulation.cameras import Camera
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS, Friction, PhysicsSettings
 from robot_layouts.simulation.simulation import Simulation
 from robot_layouts.simulation.state import State
-from robot_layouts.simulation.world import World, add_table
+from robot_layouts.simulation.world import World, add_ground, add_table
 
 if TYPE_CHECKING:
     from robot_layouts.simulation.sapien3.world import build_scene
@@ -37,6 +37,7 @@ __all__ = [
     "Sphere",
     "State",
     "World",
+    "add_ground",
     "add_table",
     "build_scene",
 ]

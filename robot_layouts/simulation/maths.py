@@ -117,14 +117,17 @@ def argmin(x: Array, axis: int | None = None) -> Any:
 
 @by_torch
 def sum(x: Any, axis: int | None = None) -> Any:
-    """Return torch's sums along an axis, or of all numbers."""
-    return x.sum() if axis is None else x.sum(axis)
+    """Return torch's sums along an axis, or of all numbers.
+
+    Of rows in memory one after the other: else torch adds in another order than for a single row.
+    """
+    return x.sum() if axis is None else x.contiguous().sum(axis)
 
 
 @by_torch
 def mean(x: Any, axis: int | None = None) -> Any:
-    """Return torch's means of floats along an axis, or of all."""
-    return x.mean() if axis is None else x.mean(axis)
+    """Return torch's means of floats along an axis, or of all; see `sum`."""
+    return x.mean() if axis is None else x.contiguous().mean(axis)
 
 
 def stack(arrays: Sequence[Array], axis: int = 0) -> Any:

@@ -366,6 +366,21 @@ class State:
         poses = [self.link_pose(robot, link) for link in fingers.links]
         return grasped(fingers, forces.take(pairs, 0), poses)
 
+    @remembered
+    def is_held(self, robot: str, body: str, fingers: Fingers) -> Flags:
+        """Whether two links of a robot hold a body as fingers do, shape (N,) bool.
+
+        For hands of more than two fingers, and what grasps besides a robot's own fingers.
+
+        Args:
+            robot: Robot name.
+            body: Body name.
+            fingers: The links, and what counts as a grasp.
+        """
+        forces = stack([self.contact_force(robot, link, body) for link in fingers.links])
+        poses = [self.link_pose(robot, link) for link in fingers.links]
+        return grasped(fingers, forces, poses)
+
     # -- distances ---------------------------------------------------------------------------
 
     def offset(self, start: str, end: str) -> Floats:

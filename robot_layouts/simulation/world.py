@@ -322,6 +322,11 @@ class World:
                     " Capsule, ConvexHull, Mesh and Plane"
                 )
         checked_choice(f"body {name!r}: kind", kind, _KINDS, SimulationError)
+        if kind == "dynamic" and any(map(_is_surface, shapes)):
+            raise SimulationError(
+                f"body {name!r} is dynamic, and the surface of a mesh collides; of a body that"
+                " physics moves, its 'hull' or 'pieces' do (a Mesh's collision)"
+            )
 
     def _pose(self, body: str, position: Any, quaternion: Any) -> list[float]:
         place = self._floats(position, 3, f"position of body {body!r}", "m")
@@ -347,6 +352,10 @@ class World:
             f"{what} in environment {self._number} is {shown(values)}; it must be {count} finite"
             f" numbers ({unit})"
         )
+
+
+def _is_surface(shape: object) -> bool:
+    return isinstance(shape, Mesh) and shape.collides and shape.collision == "surface"
 
 
 def add_table(world: World, *, textured: bool = True) -> None:
@@ -377,13 +386,29 @@ def add_table(world: World, *, textured: bool = True) -> None:
         quaternion=TABLE_QUATERNION,
         anchored=True,
     )
+    add_ground(world, GROUND_HEIGHT)
+
+
+def add_ground(world: World, height: float = 0.0, *, mipmaps: int = 4) -> None:
+    """Add ManiSkill's ground: an infinite plane, drawn as a square of 100 m with a texture.
+
+    Args:
+        world: The world.
+        height: Of the plane (m).
+        mipmaps: How many sizes of the texture there are; see `objects.shapes.Floor`.
+
+    Raises:
+        AssetError: If the world has visuals and the texture cannot be found.
+    """
+    drawn = world.visuals
     plane = Plane(
-        position=(0.0, 0.0, GROUND_HEIGHT),
+        position=(0.0, 0.0, height),
         quaternion=(0.7071068, 0.0, -0.7071068, 0.0),  # plane normal +x turned to +z
         color=(0.35, 0.37, 0.4, 1.0),
         visible=not drawn,
     )
-    world.add("ground", plane, *(_floor() if drawn else ()), kind="static")
+    floor = _floor(height, mipmaps) if drawn else ()
+    world.add("ground", plane, *floor, kind="static")
 
 
 def _table_mesh(*, textured: bool) -> tuple[Shape]:
@@ -398,7 +423,7 @@ def _table_mesh(*, textured: bool) -> tuple[Shape]:
     return (mesh,)
 
 
-def _floor() -> tuple[Shape]:
+def _floor(height: float, mipmaps: int) -> tuple[Shape]:
     # mani_skill 3.0.1, utils/building/ground.py
     texture = GROUND_TEXTURE.locate()
-    return (Floor(texture=texture, position=(0.0, 0.0, GROUND_HEIGHT)),)
+    return (Floor(texture=texture, position=(0.0, 0.0, height), mipmaps=mipmaps),)

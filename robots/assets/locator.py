@@ -10,6 +10,9 @@ from robot_layouts.core.paths import absolute
 
 # What stands around robots in pictures; physics needs none of it.
 SCENERY = "maniskill_tabletop"  # a package of the manifest
+# What ManiSkill's humanoids handle; likewise.
+HUMANOID_THINGS = "maniskill_humanoid_things"
+KITCHEN = "maniskill_kitchen_counter"  # what robots may stand at; likewise
 
 
 @dataclass(frozen=True)
@@ -112,3 +115,18 @@ def opened_path(path: str | os.PathLike[str], folder: str | os.PathLike[str] | N
 
 TABLE = FileLocator(SCENERY, "scene_builder/table/assets/table.glb")
 GROUND_TEXTURE = FileLocator(SCENERY, "building/assets/grid_texture.png")
+KITCHEN_COUNTER = FileLocator(KITCHEN, "kitchen_counter.glb")
+APPLE_BODY, APPLE, BOWL_BODY, BOWL = (
+    FileLocator(HUMANOID_THINGS, file)
+    for file in (
+        "apple_1.ply",
+        "apple_1.glb",
+        "frl_apartment_bowl_07.ply",
+        "frl_apartment_bowl_07.glb",
+    )
+)
+CARDBOARD_BOX = FileLocator(HUMANOID_THINGS, "cardboard_box/textured.obj")  # with these two:
+CARDBOARD_BOX_LOOKS = (
+    FileLocator(HUMANOID_THINGS, "cardboard_box/box.mtl"),
+    FileLocator(HUMANOID_THINGS, "cardboard_box/01.png"),
+)

@@ -14,7 +14,7 @@ from robot_layouts.simulation import Camera, PhysicsSettings, Simulation, State,
 from robot_layouts.simulation.maths import Array, Floats, copy
 from robots import UnknownNameError
 from tasks.engine.scenario import Scenario
-from tasks.language.bodies import Body, Declared, Table, WideTable, declared_bodies
+from tasks.language.bodies import Body, Declared, Scene, Table, declared_bodies
 from tasks.language.fitting import AS_DECLARED, Fit
 from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
@@ -81,7 +81,8 @@ class Task:
         native_id: Id of the ManiSkill task that it clones; None for a task of our own.
         source: Where its numbers come from; of a clone package, version and file.
         layout: Default layout; in methods, that of the environments.
-        table: What the robots stand at, the first of its bodies.
+        table: What the robots stand at, the first of its bodies: a `tasks.Table`, or another
+            `tasks.Scene`, such as the bare `tasks.Ground`.
         bodies: The bodies that its class declares, by name, in the order declared; see
             `tasks.language.bodies`.
         robot_counts: How many robots a layout may have, in places of any names; None if it takes
@@ -140,7 +141,7 @@ class Task:
     native_id: ClassVar[str | None] = None
     source: ClassVar[str] = ""
     layout: Layout
-    table: ClassVar[Table | WideTable] = Table()
+    table: ClassVar[Scene] = Table()
     bodies: ClassVar[Mapping[str, Declared]] = {}
     robot_counts: ClassVar[range | None] = None
     needs: ClassVar[Mapping[str, Needs]] = {}
@@ -206,7 +207,8 @@ class Task:
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Place the task's bodies for a new episode; the robots are placed already."""
         for name, body in self.bodies.items():
-            body.place(world, name, rng)
+            if isinstance(body, Body):
+                body.place(world, name, rng)
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Return ``success`` (N,) bool and whatever else describes the state.

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import cos, isfinite, sin
-from typing import Any, ClassVar, Literal, TypeAlias, TypedDict
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypedDict
 
 from layouts import Layout
 from objects import ObjectDescriptor, ObjectRegistry
@@ -20,9 +20,9 @@ from objects.shapes import (
     Lengths,
     Place,
 )
-from robot_layouts.core.schema import check_fields
+from robot_layouts.core.schema import check_fields, whole
 from robot_layouts.kinematics.quaternions import multiplied
-from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_table
+from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_ground, add_table
 from robot_layouts.simulation.world import TABLE_OUTLINE, BodyKind
 from robots import TaskError
 from robots.descriptor import IDENTITY, Quaternion
@@ -31,6 +31,7 @@ from tasks.language.props import (
     GREEN,
     RED,
     TARGET_HEIGHT,
+    add_kitchen_counter,
     add_wide_table,
     peg_shapes,
     target_shapes,
@@ -458,7 +459,23 @@ class Target(Body):
 
 
 @dataclass(frozen=True)
-class Table:
+class Scene(ABC):
+    """What robots stand in, under a task's ``table``: a table, a counter, or nothing but ground."""
+
+    def outline(self, layout: Layout) -> Rectangle | None:
+        """Return the outline of a table's top at z = 0: x_min, y_min, x_max, y_max (m).
+
+        None where there is no table that robots could stand in.
+        """
+        return None
+
+    @abstractmethod
+    def add_to(self, world: World, name: str) -> None:
+        """Build it; every reset finds it where it is."""
+
+
+@dataclass(frozen=True)
+class Table(Scene):
     """ManiSkill's table, 2.4 m × 1.2 m, its top at z = 0, and the floor below it.
 
     Attributes:
@@ -483,12 +500,9 @@ class Table:
         """Build it; its body is called ``table-workspace``, as in native."""
         add_table(world, textured=self.textured)
 
-    def place(self, world: World, name: str, rng: EpisodeRandom) -> None:
-        """Leave it where it is: every reset puts it back."""
-
 
 @dataclass(frozen=True)
-class WideTable:
+class WideTable(Scene):
     """A table under all robots of a layout, its top at z = 0, and the floor below it."""
 
     def outline(self, layout: Layout) -> Rectangle:
@@ -499,11 +513,54 @@ class WideTable:
         """Build it; its body is called ``table``."""
         add_wide_table(world)
 
-    def place(self, world: World, name: str, rng: EpisodeRandom) -> None:
-        """Leave it where it is: every reset puts it back."""
+
+@dataclass(frozen=True)
+class Ground(Scene):
+    """ManiSkill's floor at z = 0, and no table: what robots work at are bodies of the task.
+
+    Attributes:
+        mipmaps: How many sizes of the floor's texture there are; see `objects.shapes.Floor`.
+    """
+
+    mipmaps: Annotated[int, whole(1, 16)] = 4
+
+    def __post_init__(self) -> None:
+        """Refuse what is no number of sizes.
+
+        Raises:
+            TaskError: If ``mipmaps`` is no whole number from 1 to 16.
+        """
+        check_fields(self, TaskError)
+
+    def add_to(self, world: World, name: str) -> None:
+        """Build it; its body is called ``ground``."""
+        add_ground(world, mipmaps=self.mipmaps)
 
 
-Declared: TypeAlias = Body | Table | WideTable
+@dataclass(frozen=True)
+class KitchenCounter(Scene):
+    """ManiSkill's kitchen counter with a sink, and the floor at z = 0.
+
+    Attributes:
+        scale: How much larger it is than its file.
+    """
+
+    scale: Factor = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no scale.
+
+        Raises:
+            TaskError: If ``scale`` is no number, or out of bounds.
+        """
+        check_fields(self, TaskError)
+
+    def add_to(self, world: World, name: str) -> None:
+        """Build it; its body is called ``kitchen-counter``."""
+        add_kitchen_counter(world, self.scale)
+
+
+Declared: TypeAlias = Body | Scene
 
 
 def _turned(lying: Quaternion, turn: Quaternion) -> Quaternion:
@@ -521,5 +578,5 @@ def _bodies(task: type) -> Iterator[tuple[str, Declared]]:
     names = dict.fromkeys(name for cls in reversed(task.__mro__) for name in vars(cls))
     for name in names:
         value = getattr(task, name, None)
-        if isinstance(value, Body | Table | WideTable):
+        if isinstance(value, Body | Scene):
             yield name, value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robot_layouts.core.bounds import checked_flag, checked_number
+from robot_layouts.core.bounds import checked_flag, checked_number, shown
 from robots import RobotDescriptor, TaskError
 from robots.action_split import JointGroup, is_gripper
 
@@ -25,15 +25,17 @@ class Needs:
         reach: How far its TCP must reach from its base axis (m). No robot is refused for that by a
             task that fits its robots: one that reaches less stands nearer, and makes it smaller.
         tcp_is_link: Whether its TCP must be a link, not a point between several.
+        joints: Joints that it must drive, by name, of a task that reads them.
 
     Raises:
-        TaskError: If a number or a flag is invalid.
+        TaskError: If a number, a flag or a name is invalid.
     """
 
     fingers: bool = False
     opening: float | None = None
     reach: float | None = None
     tcp_is_link: bool = False
+    joints: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what no arm can have."""
@@ -42,6 +44,8 @@ class Needs:
         for name in ("opening", "reach"):
             if getattr(self, name) is not None:
                 checked_number(name, getattr(self, name), 0.0, LARGEST, TaskError, "m")
+        if not isinstance(self.joints, tuple) or not all(isinstance(j, str) for j in self.joints):
+            raise TaskError(f"joints is {shown(self.joints)}; a tuple of names is needed")
 
     def missing(self, robot: RobotDescriptor) -> Iterator[str]:
         """Yield what a robot lacks, in words."""
@@ -53,6 +57,8 @@ class Needs:
                 yield f"a gripper that opens {self.opening:g} m, and its own opens {opening:g} m"
         if self.reach is not None and robot.reach < self.reach:
             yield f"a reach of {self.reach:g} m, and its own is {robot.reach:g} m"
+        if lacking := [joint for joint in self.joints if joint not in robot.joints]:
+            yield f"the joints {', '.join(lacking)}, and it does not drive them"
         if self.tcp_is_link and robot.tcp_position_links:
             links = ", ".join(robot.tcp_position_links)
             yield f"a TCP that is a link, and its own is a point between {links}"

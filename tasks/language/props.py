@@ -10,8 +10,9 @@ from layouts import Layout
 from objects import ObjectDescriptor, ObjectRegistry
 from objects.shapes import Color
 from objects.solids import lowest
-from robot_layouts.simulation import Box, Cylinder, Plane, Shape, Sphere, World
+from robot_layouts.simulation import Box, Cylinder, Mesh, Plane, Shape, Sphere, World, add_ground
 from robot_layouts.simulation.world import BodyKind
+from robots.assets.locator import KITCHEN_COUNTER
 from robots.descriptor import Quaternion, Vector3
 
 RED: Color = (1.0, 0.0, 0.0, 1.0)
@@ -28,6 +29,13 @@ STONE: Color = (0.35, 0.37, 0.4, 1.0)
 
 TABLE_MARGIN = 0.3  # of a wide table beyond the outermost bases (m)
 TABLE_THICKNESS, TABLE_HEIGHT = 0.05, 0.9  # of a wide table (m)
+# A quarter turn about x, then half of one about z; the cosine of that is 6e-17 in native, too.
+COUNTER_TURN = (
+    cos(pi / 4) * cos(pi / 2),
+    sin(pi / 4) * cos(pi / 2),
+    sin(pi / 4) * sin(pi / 2),
+    cos(pi / 4) * sin(pi / 2),
+)
 UPWARD = (cos(pi / 4), 0.0, -sin(pi / 4), 0.0)  # wxyz; turns a plane's normal from x to z
 
 TARGET_HEIGHT = 1e-3  # of a target's middle above the table (m)
@@ -150,6 +158,28 @@ def wide_table_outline(layout: Layout) -> tuple[float, float, float, float]:
     bases = np.array([placement.base_position[:2] for placement in layout.values()])
     (x_min, y_min), (x_max, y_max) = bases.min(0) - TABLE_MARGIN, bases.max(0) + TABLE_MARGIN
     return float(x_min), float(y_min), float(x_max), float(y_max)
+
+
+def add_kitchen_counter(world: World, scale: float = 1.0) -> None:
+    """Add ManiSkill's kitchen counter (a static body called ``kitchen-counter``) and the ground.
+
+    Args:
+        world: The world.
+        scale: How much larger it is than its file.
+
+    Raises:
+        AssetError: If its file cannot be found.
+    """
+    # mani_skill 3.0.1, utils/scene_builder/kitchen_counter/scene_builder.py
+    counter = Mesh(
+        file=KITCHEN_COUNTER.locate(),
+        scale=(scale, scale, scale),
+        quaternion=COUNTER_TURN,
+        collision="surface",
+        textured=True,
+    )
+    world.add("kitchen-counter", counter, kind="static")
+    add_ground(world)
 
 
 def add_wide_table(world: World) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, pi, sin
+from math import cos, hypot, inf, pi, sin
 from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -183,15 +183,15 @@ def _waiting(number: int) -> Vector3:
     return (_WAITING + number, 0.0, _WAITING)
 
 
-def area_of(outline: Rectangle, looked_at: Vector3) -> Rectangle:
+def area_of(outline: Rectangle | None, looked_at: Vector3) -> Rectangle:
     """Return where distractors are put if nothing is declared: x_min, y_min, x_max, y_max (m).
 
     Args:
-        outline: Of the table.
+        outline: Of the table; None if there is none, so that they stand on the ground.
         looked_at: The point in the middle of what people see.
     """
     x, y, _ = looked_at
-    x_min, y_min, x_max, y_max = outline
+    x_min, y_min, x_max, y_max = (-inf, -inf, inf, inf) if outline is None else outline
     near = max(x_min, x - _AROUND), max(y_min, y - _AROUND)
     return (*near, min(x_max, x + _AROUND), min(y_max, y + _AROUND))
 

@@ -213,6 +213,7 @@ class TestNeeds:
             (Needs(opening=0.1), "panda", "a gripper that opens 0.1 m, and its own opens 0.08 m"),
             (Needs(reach=0.6), "so100", "a reach of 0.6 m, and its own is"),
             (Needs(tcp_is_link=True), "so100", "a TCP that is a link, and its own is a point"),
+            (Needs(joints=("waist",)), "panda", "the joints waist, and it does not drive them"),
         ],
     )
     def test_what_is_missing_is_said(self, needs, robot, words):
@@ -231,7 +232,10 @@ class TestNeeds:
         with pytest.raises(TaskError, match=r"Lift.needs names 'left'; the places are \['arm'\]"):
             check_needs("Lift", layout, layout, {"left": Needs()})
 
-    @pytest.mark.parametrize("fields", [{"opening": -1}, {"reach": float("nan")}, {"fingers": 1}])
+    @pytest.mark.parametrize(
+        "fields",
+        [{"opening": -1}, {"reach": float("nan")}, {"fingers": 1}, {"joints": "waist"}],
+    )
     def test_that_nobody_can_have(self, fields):
         with pytest.raises(TaskError):
             Needs(**fields)

@@ -35,6 +35,9 @@ AGENTS = {
     "panda_wristcam": "panda_wristcam",
     "so100": "so100",
     "trifingerpro": "trifingerpro",
+    "unitree_g1_simplified_upper_body_with_head_camera": (
+        "unitree_g1_simplified_upper_body_with_head_camera"
+    ),
 }
 BASE_NUMBERS = {"fetch": 2}  # of native's action, at its end; here the base stands still
 
@@ -51,6 +54,7 @@ OFFERED = {
     "panda_stick": CONTROL_MODES,
     "panda_wristcam": CONTROL_MODES,
     "trifingerpro": CONTROL_MODES[:6],
+    "unitree_g1_simplified_upper_body_with_head_camera": CONTROL_MODES[:2],
 }
 
 

@@ -168,8 +168,8 @@ MISTAKES = (
         dict(table=Cube(0.02)),
         (
             "Tray.table is Cube(spawn=None, start=None, kind='dyn..._size=0.02, color=(1.0, 0.0, "
-            "0.0, 1.0)); a tasks.Table or tasks.WideTable is needed, and other bodies go by "
-            "other names"
+            "0.0, 1.0)); a tasks.Scene is needed, such as tasks.Table(), and other bodies "
+            "go by other names"
         ),
     ),
     Mistake("a number as a flag", dict(rebuilds=1), "Tray.rebuilds is 1; it must be True or False"),

@@ -13,7 +13,13 @@ from tests.quick import quick_cases
 ROBOTS = ("panda", "panda_wristcam", "panda_stick", "so100")
 
 
-PLACES = [(t, place) for t in tasks.list_clones() for place in tasks.get_task_class(t).layout]
+# But for those that need joints of their own robot's.
+PLACES = [
+    (cls.task_id, place)
+    for cls in map(tasks.get_task_class, tasks.list_clones())
+    for place in cls.layout
+    if place not in cls.needs or not cls.needs[place].joints
+]
 # Every place of every clone with every robot; the others as they are. One of them is quick.
 EVERY = [(*place, robot) for place, robot in product(PLACES, ROBOTS)]
 QUICK = [(*place, robot) for place, robot in zip(PLACES, cycle(ROBOTS), strict=False)]
@@ -55,6 +61,12 @@ def test_only_what_is_driven_moves():
             for name in (driven, still)
         }
         assert moved[driven] > 0.01 > moved[still]
+
+
+def test_a_robot_without_the_joints_that_a_task_reads_is_refused():
+    lacking = "'robot' needs the joints torso_joint, left_shoulder_roll_joint, right_shoulder_roll"
+    with pytest.raises(TaskError, match=rf"{lacking}_joint, and it does not drive them"):
+        tasks.make("UnitreeG1TransportBox-v1", robots="panda")
 
 
 def test_other_places_are_refused():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,10 +22,23 @@ from objects.shapes import (
     Shape,
     Sphere,
 )
+from objects.solids import pieces
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.world import WorldBody, part_name
 from robots.urdf.mesh_files import read_corners
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece(Shape):
+    """The convex hull of a mesh's piece, of which there may be more corners than in `ConvexHull`.
+
+    Attributes:
+        corners: Points, (n, 3) (m).
+    """
+
+    corners: Any
+
 
 HIDDEN = 3  # group of geoms that collide; see `DRAWN`
 PREFIX = "/"  # of bodies' names, which no place of a layout begins with
@@ -39,6 +53,7 @@ _TYPES: dict[type[Shape], Any] = {
     Floor: mujoco.mjtGeom.mjGEOM_PLANE,
     ConvexHull: mujoco.mjtGeom.mjGEOM_MESH,
     Mesh: mujoco.mjtGeom.mjGEOM_MESH,
+    _Piece: mujoco.mjtGeom.mjGEOM_MESH,
 }
 _KINDS = {"slide": mujoco.mjtJoint.mjJNT_SLIDE, "turn": mujoco.mjtJoint.mjJNT_HINGE}
 _WEIGHTLESS = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0], "explicitinertial": True}
@@ -87,10 +102,10 @@ class BodyMaker:
         for shape in shapes:
             if self.drawn and shape.visible:
                 add_drawn(self.spec, body, shape, self._geom(shape), marker=marker)
-            if shape.collides:
+            for solid in _solids(shape) if shape.collides else ():
                 own = self.friction if shape.friction is None else shape.friction
                 body.add_geom(
-                    **self._geom(shape),
+                    **self._geom(solid),
                     group=HIDDEN,
                     density=shape.density,
                     friction=[own.static, 0.005, 0.0001],
@@ -120,6 +135,8 @@ class BodyMaker:
                 return {"size": [0.0, 0.0, 1.0]}
             case Floor():
                 return {"size": [shape.size / 2, shape.size / 2, 1.0]}
+            case _Piece(corners=corners):
+                return {"meshname": self._add_hull(corners)}
             case ConvexHull():
                 return {"meshname": self._add_hull(np.array(shape.corners))}
             case Mesh(file=file) if shape.collides:
@@ -133,6 +150,24 @@ class BodyMaker:
         inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         self.spec.add_mesh(name=name, uservert=corners.ravel().tolist(), inertia=inertia)
         return name
+
+
+def _solids(shape: Shape) -> Iterator[Shape]:
+    """Yield what stands for a shape that collides.
+
+    In MuJoCo, which lets nothing but convex bodies collide, a mesh's pieces stand for its surface.
+    """
+    if not isinstance(shape, Mesh) or shape.collision == "hull":
+        yield shape
+        return
+    for corners in pieces(str(shape.file), shape.scale):
+        yield _Piece(
+            position=shape.position,
+            quaternion=shape.quaternion,
+            friction=shape.friction,
+            density=shape.density,
+            corners=corners,
+        )
 
 
 def _has_mass(shapes: tuple[Shape, ...]) -> bool:

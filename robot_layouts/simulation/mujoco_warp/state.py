@@ -96,9 +96,16 @@ class DeviceState(State):
         if fingers is None:
             super().is_grasping(robot, body)  # warns
             return self.full(False)
+        return self.is_held(
+            robot, body, fingers if max_angle is None else within(fingers, max_angle)
+        )
+
+    @remembered
+    def is_held(self, robot: str, body: str, fingers: Fingers) -> Any:
+        """Whether two links of a robot hold a body, shape (N,) bool; see `State`."""
         forces = [self.contact_force(robot, link, body) for link in fingers.links]
         turns = [self.link_pose(robot, link)[:, 3:] for link in fingers.links]
-        return grasped(fingers if max_angle is None else within(fingers, max_angle), forces, turns)
+        return grasped(fingers, forces, turns)
 
     def _all_offsets(self, place: int) -> Any:
         """Offsets of all pairs that were ever asked for, (K, N, 3), at least up to ``place``."""

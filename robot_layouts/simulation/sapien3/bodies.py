@@ -248,12 +248,20 @@ def add_collision(builder: Any, shape: Shape) -> None:
         case Capsule():
             add, sizes = builder.add_capsule_collision, _round_sizes(shape)
         case Mesh():
-            add = builder.add_convex_collision_from_file
+            add = getattr(builder, _MESHES[shape.collision])
             sizes = {"filename": str(shape.file), "scale": list(shape.scale)}
         case _:
             raise TypeError(f"no collision for {type(shape).__name__}")
     patch = {"patch_radius": shape.patch_radius, "min_patch_radius": shape.min_patch_radius}
     add(density=shape.density, **common, **patch, **sizes)
+
+
+# SAPIEN's builder's methods.
+_MESHES = {
+    "hull": "add_convex_collision_from_file",
+    "pieces": "add_multiple_convex_collisions_from_file",
+    "surface": "add_nonconvex_collision_from_file",
+}
 
 
 def attach_hulls(component: Any, shapes: tuple[Shape, ...]) -> None:

@@ -35,7 +35,6 @@ from robot_layouts.simulation.sapien3.light_meshes import TEXTURES
 from robots.descriptor import Vector3
 
 _PLANE_HALF_SIZE = 50.0  # of what is drawn of an infinite plane (m)
-_MIPMAPS = 4  # of a floor's texture, as in mani_skill 3.0.1, utils/building/ground.py
 
 
 def visual_component(shapes: tuple[Shape, ...]) -> RenderBodyComponent | None:
@@ -141,7 +140,7 @@ def _floor(shape: Floor) -> RenderShapeTriangleMesh:
     beside, ahead = corner + 1, corner + shape.size + 1
     triangles = [(corner, ahead, beside), (ahead, ahead + 1, beside)]
     material = RenderMaterial()
-    material.base_color_texture = RenderTexture2D(str(shape.texture), mipmap_levels=_MIPMAPS)
+    material.base_color_texture = RenderTexture2D(str(shape.texture), mipmap_levels=shape.mipmaps)
     return RenderShapeTriangleMesh(
         vertices=places,
         triangles=np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in triangles]),
