@@ -49,7 +49,7 @@ def answers_under(setting: Setting, module: str, request: Any, count: int) -> li
         if (emulator := shutil.which(EMULATOR)) is None:
             raise SimulationError(
                 f"there is no program {EMULATOR!r} to emulate a {setting.emulated} with; Debian's"
-                " package qemu-user-static brings it"
+                " package qemu-user-static brings it, from version 10 on without mistakes in AVX"
             )
         command = [emulator, "-cpu", setting.emulated, *command]
     done = subprocess.run(

@@ -18,6 +18,7 @@ from robots import UnknownNameError
 from robots.descriptor import Vector3
 
 TABLE = "utils/scene_builder/table/scene_builder.py"
+ROTATE_VALVE = "envs/tasks/dexterity/rotate_valve.py"
 ROLL_BALL_LENGTH = hypot(0.7071, 0.7072)  # native's (0.7071, 0, 0, -0.7072), scaled to length 1
 
 
@@ -36,6 +37,13 @@ def _g1(position: Vector3, **place: object) -> Layout:
 
 _panda = partial(single, {"arm": "panda"})
 _panda_wristcam = partial(single, {"arm": "panda_wristcam"})
+_dclaw = partial(
+    _one,
+    "dclaw",
+    position=(0.0, 0.0, 0.28),
+    quaternion=(0.0, 0.0, -1.0, 0.0),
+    qpos=(0.7, -0.7, -0.7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+)
 
 # id -> (how to build the layout, where native has its numbers), sorted by id.
 TASKS: Mapping[str, tuple[Callable[[], Layout], str]] = {
@@ -69,6 +77,7 @@ TASKS: Mapping[str, tuple[Callable[[], Layout], str]] = {
         ),
         "envs/tasks/tabletop/roll_ball.py",
     ),
+    **{f"RotateValveLevel{level}-v1": (_dclaw, ROTATE_VALVE) for level in range(5)},
     "StackCube-v1": (_panda_wristcam, TABLE),
     "StackPyramid-v1": (_panda_wristcam, TABLE),
     "TwoRobotPickCube-v1": (partial(_two, "panda_wristcam", 1.5), TABLE),

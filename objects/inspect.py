@@ -7,6 +7,7 @@ from pathlib import PurePath
 from typing import Annotated
 
 from objects.descriptor import ObjectDescriptor
+from objects.joints import Joint
 from objects.packaged import PACKAGED
 from objects.registry import ObjectRegistry
 from objects.shapes import Mesh
@@ -88,16 +89,18 @@ def report(thing: ObjectDescriptor) -> str:
         "grasps": _grasps(thing),
         "parts": _parts(thing),
         "joints": columns(
-            [
-                (joint.name, f"{joint.kind}s", f"{joint.lower:g} to {joint.upper:g} {joint.unit}")
-                for joint in thing.joints
-            ]
+            [(joint.name, f"{joint.kind}s", _range(joint)) for joint in thing.joints]
         ),
     }
     lines = [
         line for title, body in sections.items() for line in (title, *(f"  {row}" for row in body))
     ]
     return printable("\n".join(lines))
+
+
+def _range(joint: Joint) -> str:
+    low, high = joint.limits
+    return "without end" if joint.is_endless else f"{low:g} to {high:g} {joint.unit}"
 
 
 def _grasps(thing: ObjectDescriptor) -> Iterator[str]:

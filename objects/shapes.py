@@ -18,6 +18,8 @@ Color = tuple[Fraction, Fraction, Fraction, Fraction]  # red, green, blue, alpha
 Length = Annotated[float, within(1e-6, FAR, "m")]
 """Of an edge, a radius, half of either: more than none."""
 Lengths = tuple[Length, Length, Length]
+Radius = Annotated[float, within(0.0, FAR, "m")]
+"""Of what may be missing."""
 Density = Annotated[float, within(1e-3, 1e6, "kg/m³")]
 Coordinate = Annotated[float, within(-FAR, FAR, "m")]
 Place = tuple[Coordinate, Coordinate, Coordinate]
@@ -98,6 +100,9 @@ class Shape:
         quaternion: Orientation in the body's frame, wxyz.
         friction: Contact material; None takes the world's.
         density: Density (kg/m³).
+        patch_radius: With it SAPIEN makes contacts resist that they are turned about their normal,
+            the more the deeper they are (m); MuJoCo's do not.
+        min_patch_radius: Radius of the patch that resists so however shallow they are (m).
         color: Colour when drawn.
         finish: Surface when drawn.
         collides: Whether it takes part in contacts.
@@ -108,6 +113,8 @@ class Shape:
     quaternion: Quaternion = IDENTITY
     friction: Friction | None = None
     density: Density = 1000.0
+    patch_radius: Radius = 0.0
+    min_patch_radius: Radius = 0.0
     color: Color = GREY
     finish: Finish = MATT
     collides: bool = True
@@ -255,7 +262,12 @@ def scaled(shape: Shape, factor: float) -> Shape:
         SimulationError: If the shape has no size, as a plane has none.
     """
     x, y, z = shape.position
-    moved = replace(shape, position=(x * factor, y * factor, z * factor))
+    moved = replace(
+        shape,
+        position=(x * factor, y * factor, z * factor),
+        patch_radius=shape.patch_radius * factor,
+        min_patch_radius=shape.min_patch_radius * factor,
+    )
     match moved:
         case Box(half_size=(a, b, c)):
             return replace(moved, half_size=(a * factor, b * factor, c * factor))

@@ -137,11 +137,12 @@ def part_poses(joints: Sequence[Joint], root: Floats, positions: Floats) -> Mapp
         positions: Of its joints, (T, joints).
 
     Returns:
-        The pose of each part by name, (T, 7); that of the thing where all joints are at zero.
+        The pose of each part by name, (T, 7); that of the thing where all joints are at zero,
+        moved by the joint's ``origin``.
     """
-    found = dict[str, Floats]()
+    found, moved = dict[str, Floats](), dict[str, Floats]()
     for joint, position in zip(joints, np.asarray(positions, float).T, strict=True):
-        carrier = np.asarray(root if joint.carrier is None else found[joint.carrier], float)
+        carrier = np.asarray(root if joint.carrier is None else moved[joint.carrier], float)
         axis, at = np.array(joint.axis), np.array(joint.at)
         turn = np.zeros((len(position), 4))
         turn[:, 0], way = 1.0, position[:, None] * axis
@@ -149,7 +150,11 @@ def part_poses(joints: Sequence[Joint], root: Floats, positions: Floats) -> Mapp
             turn[:, 0], turn[:, 1:] = np.cos(position / 2), np.sin(position / 2)[:, None] * axis
             way = at - rotate(turn, np.broadcast_to(at, way.shape))
         place = carrier[:, :3] + rotate(carrier[:, 3:], way)
-        found[joint.name] = np.concatenate([place, multiply(carrier[:, 3:], turn)], axis=1)
+        turned = multiply(carrier[:, 3:], turn)
+        found[joint.name] = moved[joint.name] = np.concatenate([place, turned], axis=1)
+        if any(joint.origin):
+            origin = np.broadcast_to(np.array(joint.origin), place.shape)
+            found[joint.name] = np.concatenate([place + rotate(turned, origin), turned], axis=1)
     return found
 
 

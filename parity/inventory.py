@@ -31,7 +31,6 @@ REASONS = {  # by the beginning of a task's id
     "PickCubeWidowXAI-v1": "needs robot files that native downloads: widowxai",
     "ReplicaCAD": _SCENES,
     "RotateSingleObjectInHand": f"{_NO_ROBOT}allegro_hand_right_touch",
-    "RotateValve": f"{_NO_ROBOT}dclaw",
     "SceneManipulation-v1": _SCENES,
     "TableTopFreeDraw-v1": "nothing to achieve: free drawing",
 }

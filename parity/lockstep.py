@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 import tasks
-from parity.native import make_native, native_action, native_action_dim, quiet
+from parity.native import make_native, native_action, native_action_dim, native_agents, quiet
 from robot_layouts.simulation.sapien3.contacts import presses_on_object
 from robots import CONTROL_MODES, TaskError
 from tasks import TaskEnv
@@ -208,6 +208,11 @@ class OurSide:
         return self.env.simulation.backend.touching()
 
 
+def _robots(env: Any) -> list[Any]:
+    """Return SAPIEN's articulations of the robots of a native environment."""
+    return [agent.robot._objs[0] for agent in native_agents(env)]
+
+
 class NativeSide:
     """Native environments, one after the other: on the CPU, each holds a single one."""
 
@@ -247,7 +252,9 @@ class NativeSide:
 
     def touching(self) -> NDArray[np.bool_]:
         """Tell where a robot touched a movable object; see `Side`."""
-        return np.array([presses_on_object(env.scene.px.get_contacts()) for env in self.envs])
+        return np.array(
+            [presses_on_object(env.scene.px.get_contacts(), _robots(env)) for env in self.envs]
+        )
 
     def close(self) -> None:
         """Let the environments go."""

@@ -37,6 +37,7 @@ _FOR_USERS = {
     "tasks describe": "tasks.commands:print_description",
     "tasks view": "robot_layouts.data.commands:view_task",
     "tasks preview": "tasks.commands:preview",
+    "tasks export": "tasks.commands:export",
     "tasks check": "robot_layouts.data.gate:check",
     "layouts show": "layouts.commands:show",
     "layouts validate": "layouts.commands:validate",

@@ -134,11 +134,13 @@ class NativeAgent:
         base_joints: Joints of its base, static up to ``base_speed`` whatever a task's threshold.
             Where it has some, joints that move backwards are static however fast they are.
         base_speed: That speed (m/s, rad/s).
+        tip_links: Links whose poses it observes of itself, as ``tip_poses``; in every task here.
     """
 
     tcp_links: tuple[str, ...] = ()
     base_joints: tuple[str, ...] = ()
     base_speed: float = 0.0
+    tip_links: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse repeated names and a negative speed."""
@@ -148,6 +150,7 @@ class NativeAgent:
     def _problems(self) -> Iterator[str]:
         yield from repeated("NativeAgent: tcp_links", self.tcp_links)
         yield from repeated("NativeAgent: base_joints", self.base_joints)
+        yield from repeated("NativeAgent: tip_links", self.tip_links)
         if self.base_speed < 0:
             yield f"NativeAgent: base_speed is {self.base_speed}; it must not be negative"
 

@@ -73,6 +73,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "Goal",
     "Ground",
     "Info",
+    "Joint",
     "KitchenCounter",
     "Light",
     "LogUniform",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import closing
 from typing import Annotated
 
 from rich.console import Console
@@ -131,6 +132,29 @@ def preview(
     )
     env.close()
     print(f"picture: {pictures.save(picture, target)}")
+
+
+def export(
+    task: str,
+    *,
+    out: Annotated[str, Word("PATH")],
+    seed: int = 0,
+    cell: CellOptions,
+) -> None:
+    """Write a task's world, as an episode begins, as an MJCF model for MuJoCo.
+
+    Args:
+        task: Task id or another of its names; MODULE:ID for one of your own.
+        out: The model (.xml); meshes of robots go into a folder beside it.
+        seed: Which episode.
+        cell: Its robots, and what varies.
+
+    Raises:
+        RobotLayoutsError: If the task cannot be made, or cannot be written.
+    """
+    with closing(make(task, **cell.making())) as env:
+        env.reset(seed)
+        print(f"model: {env.to_mjcf(out)}")
 
 
 def _console() -> Console:

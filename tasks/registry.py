@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields as fields_of
 from dataclasses import replace
@@ -92,6 +93,11 @@ CATALOGUE = {
     "PushT-v1": "tasks.maniskill.push_t:PushT",
     "Relay-v1": "tasks.originals.relay:Relay",
     "RollBall-v1": "tasks.maniskill.roll_ball:RollBall",
+    "RotateValveLevel0-v1": "tasks.maniskill.rotate_valve:RotateValveLevel0",
+    "RotateValveLevel1-v1": "tasks.maniskill.rotate_valve:RotateValveLevel1",
+    "RotateValveLevel2-v1": "tasks.maniskill.rotate_valve:RotateValveLevel2",
+    "RotateValveLevel3-v1": "tasks.maniskill.rotate_valve:RotateValveLevel3",
+    "RotateValveLevel4-v1": "tasks.maniskill.rotate_valve:RotateValveLevel4",
     "StackCube-v1": "tasks.maniskill.stack_cube:StackCube",
     "StackPyramid-v1": "tasks.maniskill.stack_pyramid:StackPyramid",
     "TwoRobotHandOver-v1": "tasks.originals.two_robot_hand_over:TwoRobotHandOver",
@@ -108,6 +114,9 @@ CATALOGUE = {
 TaskClass = TypeVar("TaskClass", bound="type[MultiRobotTask]")
 
 _listeners: list[Callable[[Iterable[str]], None]] = []
+
+
+_WORD_ENDS = re.compile("(?<=[a-z])(?=[A-Z])")
 
 
 def _native_name(name: str) -> str:
@@ -135,7 +144,7 @@ TASKS = Catalogue(
     check=_check,
     error=TaskError,
     aliases={
-        _native_name(target.partition(":")[0].removeprefix(CLONES)): task_id
+        _native_name(_WORD_ENDS.sub("_", task_id.partition("-v")[0]).lower()): task_id
         for task_id, target in CATALOGUE.items()
         if target.startswith(CLONES)
     }

@@ -5,6 +5,7 @@ Functions of arrays are in `tasks.maths`, presets of layouts in `layouts`.
 # ruff: noqa: F401
 # pyright: reportUnusedImport=false
 
+from objects.joints import Joint
 from objects.shapes import POLISHED, Color, Finish, linear
 from robot_layouts.simulation import (
     Box,

@@ -247,6 +247,16 @@ def right_arm_at(puppeteer: Puppeteer, position: Sequence[float]) -> dict[str, f
     return {name: q for name, q, own in zip(names, joints.tolist(), arm, strict=True) if own}
 
 
+def turn_valve(puppeteer: Puppeteer) -> None:
+    """Swing all fingers to and fro, so that they push the spokes; found by trying."""
+    swing = np.repeat([1.19, 0.11, -0.41], 3)  # of the fingers' first joints, second and third
+    phases = np.array([7.77, 5.42, 6.76, *[0.11] * 3, *[2.75] * 3])
+    inwards = np.array([-0.42, 0.42, 0.42, *[0.71] * 3, *[0.53] * 3])  # at first
+    for step in range(60):
+        action = swing * np.sin(0.13 * step + phases) + inwards * (step < 10)
+        puppeteer.play(action.astype(np.float32))
+
+
 def touch_something(puppeteer: Puppeteer) -> None:
     """Reach for the first movable body with every robot in turn; for tasks not listed below."""
     bodies = [
@@ -271,6 +281,7 @@ MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
     "PickCubeSO100-v1": pick_cube_so100,
     "PokeCube-v1": poke_cube,
     "PushT-v1": push_t,
+    **{f"RotateValveLevel{level}-v1": turn_valve for level in range(5)},
     "TwoRobotPickCube-v1": two_robot_pick_cube,
     "UnitreeG1PlaceAppleInBowl-v1": close_on_apple,
     "UnitreeG1TransportBox-v1": lift_box,

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 
+from objects import ObjectDescriptor
 from robot_layouts.core.writing import written_whole
 from robots import LayoutError, RobotDescriptor, UrdfLocator
 from robots.assets.assembled import AssembledUrdf
@@ -86,15 +87,15 @@ def replaced_folder(folder: Path, is_own: Callable[[Path], bool], advice: str) -
         yield made
 
 
-def licence_note(robots: Iterable[RobotDescriptor]) -> str:
-    """Return a page that says under what licence the files of some robots are.
+def licence_note(robots: Iterable[RobotDescriptor], things: Iterable[ObjectDescriptor] = ()) -> str:
+    """Return a page that says under what licence the files of some robots and things are.
 
     Args:
         robots: The robots, of which each is listed once.
+        things: The things, likewise.
     """
-    lines = dict.fromkeys(
-        f"- {robot.name}: {words}" for robot in robots for _, words in licences_of(robot)
-    )
+    lines = [f"- {robot.name}: {words}" for robot in robots for _, words in licences_of(robot)]
+    lines = list(dict.fromkeys([*lines, *(f"- {one.name}: {one.licence}" for one in things)]))
     head = (
         "# Robot files\n\nThe meshes and numbers of robots are made of files that others wrote."
         " They are not this package's, and stay under their licences:\n"

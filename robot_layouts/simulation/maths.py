@@ -270,6 +270,13 @@ def like(x: Array, values: Any) -> Any:
     return _constant(values) if isinstance(values, tuple) else np.array(values, np.float32)
 
 
+def doubles(x: Array, values: Sequence[Any]) -> Any:
+    """Return numbers as an array of the kind of another, float64, on its device."""
+    if isinstance(x, Tensor):
+        return torch.tensor(values, dtype=torch.float64, device=x.device)
+    return np.array(values, np.float64)
+
+
 def constant(x: Array, values: Floats) -> Any:
     """Return a constant NumPy array as an array of the kind of ``x``, whose memory it may share."""
     return _kept(values, x.device) if isinstance(x, Tensor) else values

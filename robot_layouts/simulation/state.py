@@ -19,6 +19,7 @@ from robot_layouts.simulation.maths import (
     Floats,
     concatenate,
     counted,
+    doubles,
     full,
     like,
     norm,
@@ -143,6 +144,10 @@ class State:
         """
         return like(self.joint_positions, values)
 
+    def doubles(self, values: Sequence[Any]) -> Array:
+        """Return numbers as an array of its own, float64: where native's are."""
+        return doubles(self.joint_positions, values)
+
     def full(self, value: float) -> Array:
         """Return a number or a flag for every environment, shape (N,)."""
         return full(self.joint_positions, self.num_envs, value)
@@ -258,6 +263,10 @@ class State:
     def link_position(self, robot: str, link: str) -> Floats:
         """Position of a link, shape (N, 3) (m)."""
         return self.all_poses[self._index.links[robot][link], :, :3]
+
+    def link_poses(self, robot: str, links: Iterable[str]) -> Floats:
+        """Poses of links one after the other, shape (N, 7 · links)."""
+        return concatenate([self.link_pose(robot, link) for link in links], 1)
 
     def base_pose(self, robot: str) -> Floats:
         """Pose of a robot's root link, shape (N, 7)."""

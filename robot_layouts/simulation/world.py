@@ -139,6 +139,8 @@ class World:
         visuals: Whether what pictures need is built, and which meshes.
         bodies: Body by name.
         design: Geometry drawn for the coming episodes, if the task draws any.
+        notes: Numbers by name that the task drew for the episode and no body shows, such as which
+            way something is to be turned; its `remember` finds them here.
         size: Factor on the size of all bodies that are added.
         scales: Another one by body; 1 for those that are left out.
         links_pass: Whether links of two robots pass through each other where the robots' files let
@@ -173,6 +175,7 @@ class World:
         self.visuals: Visuals = visuals
         self.bodies: dict[str, WorldBody] = {}
         self.design: Any = None
+        self.notes: dict[str, float] = {}
         self.size = 1.0
         self.scales: Mapping[str, float] = {}
         self.links_pass = links_pass
@@ -228,7 +231,9 @@ class World:
         )
         self.bodies[name] = body
         for joint in joints:
-            part = WorldBody(part_name(name, joint.name), joint.parts, marker=marker, part_of=name)
+            part = WorldBody(
+                part_name(name, joint.name), joint.own_parts, marker=marker, part_of=name
+            )
             self.bodies[part.name] = part
         return body
 

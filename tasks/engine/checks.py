@@ -263,14 +263,21 @@ class ReturnedReward:
         dtype: Their type; None as long as there was none.
     """
 
-    def __init__(self, method: str, num_envs: int) -> None:
-        """Take the method in words, and the number of environments N."""
+    def __init__(self, method: str, num_envs: int, *, double: bool = False) -> None:
+        """Take the method in words, the number of environments N, and what to make of rewards.
+
+        Args:
+            method: In words.
+            num_envs: N.
+            double: Whether rewards become float64; else float32.
+        """
         self._method, self._num_envs = method, num_envs
+        self._kept = np.float64 if double else np.float32
         self._shape = (num_envs,)
         self.dtype: np.dtype[Any] | None = None
 
-    def checked(self, reward: Any) -> NDArray[np.float32]:
-        """Return a reward as float32.
+    def checked(self, reward: Any) -> NDArray[Any]:
+        """Return a reward as float32, or as float64 if it is to become that.
 
         Raises:
             TaskError: If it is not a valid reward; says what it must be.
@@ -282,7 +289,7 @@ class ReturnedReward:
                 f"{self._method} returned {_form(reward)}; it must have shape {self._shape}"
                 f"{_advice(reward, self._num_envs)}"
             )
-        return np.asarray(reward, np.float32)
+        return np.asarray(reward, self._kept)
 
     def _looked_at(self, reward: Any) -> NDArray[Any]:
         needed = f"a floating array of shape {self._shape}, one reward for each environment"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
+from os import PathLike
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -48,6 +50,7 @@ from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisio
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import SENSOR_RENDER_MODES, Scenario, Touch, touch_links
 from tasks.engine.task import Info, Memory, Task
+from tasks.language.bodies import Object
 from tasks.language.randomness import EpisodeRandom, phrasings
 from tasks.language.stages import PassedStages
 from tasks.native.format import StateDict, StateTape, read_state_dict, write_state_dict
@@ -172,7 +175,8 @@ class TaskEnv(Remade):
         )
         first = task.first_seed if first_seed is None else first_seed
         self._rngs = [EpisodeRandom(first + i) for i in range(self.num_envs)]
-        self._max_reward = np.array(task.max_reward, np.float32)
+        kept = np.float64 if task.double_rewards else np.float32
+        self._max_reward = np.array(task.max_reward, kept)
         self._elapsed = np.zeros(self.num_envs, np.int32)
         self._everywhere: Sequence[int] = range(self.num_envs)
         task.moving = self._everywhere
@@ -339,7 +343,7 @@ class TaskEnv(Remade):
 
         Returns:
             Observation, reward (N,) float32, terminated (N,), truncated (N,), info. An
-            environment terminates when it succeeds.
+            environment terminates when it succeeds. See `Task.double_rewards`.
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
@@ -394,6 +398,34 @@ class TaskEnv(Remade):
     def get_state_dict(self) -> StateDict:
         """Return all poses and velocities under native's keys; see `native_format`."""
         return read_state_dict(self.simulation, self._state)
+
+    def to_mjcf(self, path: str | PathLike[str]) -> Path:
+        """Save the first environment as one MJCF model for MuJoCo, as it stands.
+
+        It has the robots as `layouts.Layout.to_mjcf` describes them, the task's bodies under their
+        names, with what they weigh and how they rub, and a keyframe ``now`` with the present state
+        and drives that hold the robots in it. Bodies that nothing moves, or only the task, are
+        ``mocap`` bodies. Meshes of robots are in a folder ``NAME_assets``, those of bodies in the
+        file; MuJoCo writes numbers of six digits. What varies in each episode beyond sizes and
+        places, such as friction, is as declared.
+
+        Args:
+            path: Where to save; must end in ``.xml``. The folder beside it is replaced if it
+                exists.
+
+        Returns:
+            The path of the model.
+
+        Raises:
+            LayoutError: If the path ends otherwise, or the folder holds something else.
+            AssetError: If a file of a robot or a body cannot be found or is invalid.
+            SimulationError: If MuJoCo cannot do what the task's physics settings ask for.
+            MissingPackageError: If mujoco is not installed.
+        """
+        from robot_layouts.simulation.mujoco.export import write_world
+
+        things = [own.descriptor for own in self.task.bodies.values() if isinstance(own, Object)]
+        return write_world(self.simulation, self._state, path, things)
 
     def begin_tape(self) -> StateTape:
         """Return a tape of states for the present episode; see `write_tape`."""
@@ -463,7 +495,8 @@ class TaskEnv(Remade):
         self._judged = ReturnedArrays(f"{name}.evaluate()", count, judges=True)
         self._observed = ReturnedArrays(f"{name}.observe()", count, axes=2)
         self._remembered = ReturnedArrays(f"{name}.remember()", count)
-        self._rewards = ReturnedReward(f"{name}.dense_reward()", count)
+        double = self.task.double_rewards
+        self._rewards = ReturnedReward(f"{name}.dense_reward()", count, double=double)
 
     def _build_world(self, world: World, index: int) -> None:
         rng = self._rngs[index]

@@ -40,6 +40,7 @@ from tasks.native.format import observation_keys
 from tasks.randomization.noise import Noisy
 
 JOINTS = "qpos", "qvel"  # that every robot observes of itself
+TIPS = "tip_poses"  # that it observes besides if it has `robots.NativeAgent.tip_links`
 STATE_FORMS = ("state", "state_dict")  # what may be joined to images
 _JOINED = {"pointcloud": POINTS, "none": ()}  # what native takes in their company, too
 
@@ -96,6 +97,12 @@ MODES = {
 
 OBS_MODES = (*MODES, "rgb", "rgb+depth+state", "depth", "rgb+segmentation")
 """Examples of observation modes; images and a form of state are joined in any order."""
+
+
+def tip_links(layout: Layout) -> dict[str, tuple[str, ...]]:
+    """Return the links whose poses robots observe of themselves, of those that do."""
+    links = {name: place.robot.native_agent.tip_links for name, place in layout.items()}
+    return {name: own for name, own in links.items() if own}
 
 
 def read_mode(name: str) -> ObservationMode:
@@ -169,6 +176,7 @@ class Observer:
         for camera in self.cameras.values():
             told_by(camera, mode.textures or ())
         self._keys, self._robots, self._sensed = observation_keys(layout), tuple(layout), sensed
+        self._tips = tip_links(layout)
         self._rigs: dict[tuple[str, ...], CameraRig] = {}  # by what they take
         self._columns = ColumnObserver(layout, mode.columns, viewpoint) if mode.columns else None
         if mode.columns:
@@ -258,7 +266,8 @@ class Observer:
                 f"sensor_noise is not added to obs_mode {self.mode.columns!r}; it is to"
                 f" {', '.join(STATE_FORMS)} and what is observed beside images"
             )
-        return [*(f"{robot}.{joints}" for robot in self._robots for joints in JOINTS), *parts]
+        own = [f"{robot}.{joints}" for robot in self._robots for joints in JOINTS]
+        return [*own, *(f"{robot}.{TIPS}" for robot in self._tips), *parts]
 
     def slices(
         self, simulation: Simulation, state: State, parts: Mapping[str, Array]
@@ -274,6 +283,8 @@ class Observer:
                 if entry.robot == name:
                     key = f"{name}.{controllers.CONTROLLER}.{entry.key.replace('/', '.')}"
                     sizes[key] = sum(entry.sizes)
+            if name in self._tips:
+                sizes[f"{name}.{TIPS}"] = state.link_poses(name, self._tips[name]).shape[1]
         sizes.update({key: x.shape[1] if x.ndim == 2 else 1 for key, x in parts.items()})
         slices, start = dict[str, slice](), 0
         for name, size in sizes.items():
@@ -317,6 +328,10 @@ class Observer:
         if kept:
             for entry, row in zip(kept, controllers.recall(simulation, kept), strict=True):
                 robots[self._robots.index(entry.robot)].append(row)
+        for name, links in self._tips.items():
+            tips = state.link_poses(name, links)
+            tips = tips if noisy is None else noisy(f"{name}.{TIPS}", tips)
+            robots[self._robots.index(name)].append(tips)
         return self._flat(robots, parts) if self.mode.flat else self._named(robots, kept, parts)
 
     def _flat(self, robots: Sequence[Sequence[Floats]], parts: Mapping[str, Array]) -> Floats:
@@ -336,13 +351,14 @@ class Observer:
         kept: Sequence[controllers.Entry],
         parts: Mapping[str, Array],
     ) -> dict[str, Any]:
-        joints = [row for own in robots for row in own]
-        if not all(map(all_finite, (*joints, *parts.values()))):
+        numbers = [row for own in robots for row in own]
+        if not all(map(all_finite, (*numbers, *parts.values()))):
             raise NotFinite
         agent: dict[str, Any] = {}
         for (name, key), own in zip(self._keys.items(), robots, strict=True):
             remembered = [f"{controllers.CONTROLLER}/{e.key}" for e in kept if e.robot == name]
-            rows = zip((*JOINTS, *remembered), own, strict=True)
+            tips = (TIPS,) if name in self._tips else ()
+            rows = zip((*JOINTS, *remembered, *tips), own, strict=True)
             tree = controllers.nested({row_name: row.copy() for row_name, row in rows})
             agent.update(tree if key is None else {key: tree})
         return {"agent": agent, "extra": {key: x.copy() for key, x in parts.items()}}

@@ -18,7 +18,7 @@ from robots import ActionError, SimulationError, TaskError
 from tasks.engine.actions import given_robots
 from tasks.engine.checks import ELAPSED, SEED, SOLVED, SUCCESS, checked_options, checked_seeds
 from tasks.engine.env import TaskEnv
-from tasks.engine.observation import JOINTS, STATE_FORMS
+from tasks.engine.observation import JOINTS, STATE_FORMS, TIPS, tip_links
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import Info, Memory, Task
@@ -144,6 +144,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         )
         self.action_split, self._mode = host.action_split, host.observer.mode
         self._keys, self._kept = observation_keys(host.layout), controllers.entries(host.simulation)
+        self._tips = tip_links(host.layout)
         self._responds, self._ignores = cls.respond is not Task.respond, ignore_terminations
         self._scores = torch.tensor([0.0, *task.stages.values()], device=on)
         self._seeds = torch.arange(count, device=on) + secrets.randbelow(2**32 - count)
@@ -319,6 +320,8 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             rows = torch.cat([recalled[part] for part in entry.parts], 1)
             order = self._simulation.index.native[entry.robot] if entry.joints else None
             robots[entry.robot].append(rows if order is None else rows[:, order])
+        for name, links in self._tips.items():
+            robots[name].append(state.link_poses(name, links))
         parts: dict[str, Any] = self.task.observe(state, info)
         if not self._mode.flat:
             return self._named(robots, parts)
@@ -330,7 +333,8 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         agent: dict[str, Any] = {}
         for (name, key), own in zip(self._keys.items(), robots.values(), strict=True):
             kept = [f"{controllers.CONTROLLER}/{e.key}" for e in self._kept if e.robot == name]
-            tree = controllers.nested(dict(zip((*JOINTS, *kept), own, strict=True)))
+            tips = (TIPS,) if name in self._tips else ()
+            tree = controllers.nested(dict(zip((*JOINTS, *kept, *tips), own, strict=True)))
             agent.update(tree if key is None else {key: tree})
         return {"agent": agent, "extra": dict(parts)}
 

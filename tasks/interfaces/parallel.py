@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv
 
 from robot_layouts.core.bounds import shown
 from robots import TaskError, UnknownNameError
-from tasks.engine.observation import read_mode, space_of
+from tasks.engine.observation import TIPS, read_mode, space_of
 from tasks.engine.scenario import RENDER_MODES
 from tasks.interfaces.gymnasium import OneEnvironment, info_row, row
 from tasks.native.controllers import CONTROLLER
@@ -165,15 +165,15 @@ class ParallelTask(OneEnvironment, ParallelEnv[str, Observation, NDArray[np.floa
     def _observed(self) -> dict[str, NDArray[np.intp]]:
         slices = self.task.observation_slices
         joints = {f"{robot}.{kind}" for robot in self.task.layout for kind in JOINTS}
-        robots = tuple(f"{robot}.{CONTROLLER}." for robot in self.task.layout)
+        besides = {robot: _besides(robot) for robot in self.task.layout}
+        owned = tuple(beginning for own in besides.values() for beginning in own)
 
         def places(robot: str) -> list[NDArray[np.intp]]:
-            """Return where the observation has a robot's targets, and the parts for all robots."""
+            """Return where the observation has what a robot alone observes, and all robots."""
             return [
                 np.arange(part.start, part.stop)
                 for key, part in slices.items()
-                if key.startswith(f"{robot}.{CONTROLLER}.")
-                or not (key in joints or key.startswith(robots))
+                if key.startswith(besides[robot]) or not (key in joints or key.startswith(owned))
             ]
 
         return {
@@ -223,6 +223,11 @@ class ParallelTask(OneEnvironment, ParallelEnv[str, Observation, NDArray[np.floa
                 f" {info['elapsed_steps']}; it must be a finite number"
             )
         return reward
+
+
+def _besides(robot: str) -> tuple[str, str]:
+    """Return how the names begin of what a robot observes of itself besides its joints."""
+    return f"{robot}.{CONTROLLER}.", f"{robot}.{TIPS}"
 
 
 def _look_up(spaces: Mapping[str, _Space], agent: str) -> _Space:

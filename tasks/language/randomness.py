@@ -144,6 +144,28 @@ class EpisodeRandom:
         """Draw ``count`` float32 numbers of mean 0 from the torch stream (unit of ``std``)."""
         return torch.normal(0.0, std, (1, count), generator=self.torch)[0]
 
+    def torch_standard_normal(self, count: int) -> Tensor:
+        """Draw ``count`` float32 numbers of mean 0 and deviation 1 from the torch stream.
+
+        Times a deviation they are the numbers of `torch_normal` but for their last bits.
+        """
+        return torch.randn((1, count), generator=self.torch)[0]
+
+    def torch_uniform(self, low: float, high: float, count: int) -> Tensor:
+        """Draw ``count`` float32 numbers in [low, high) from the torch stream.
+
+        As ``Tensor.uniform_`` draws them: the numbers of `uniform_between` but for their last bits.
+        """
+        drawn = torch.empty(count).uniform_(low, high, generator=self.torch)
+        if self.spread == 1.0:
+            return drawn
+        middle = (low + high) / 2
+        return middle + self.spread * (drawn - middle)
+
+    def torch_whole(self, low: int, high: int) -> int:
+        """Draw a whole number from ``low`` to ``high - 1`` from the torch stream."""
+        return int(torch.randint(low, high, (1,), generator=self.torch))
+
     def normal(self, std: float, count: int) -> NDArray[np.float64]:
         """Draw ``count`` numbers of mean 0 from the numpy stream (unit of ``std``)."""
         return self.numpy.normal(0, std, count)

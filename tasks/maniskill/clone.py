@@ -6,7 +6,7 @@ from math import inf
 from typing import Any, ClassVar
 
 from tasks import EpisodeRandom, MultiRobotTask, State, World
-from tasks.maths import Flags, Floats, like, norm
+from tasks.maths import Flags, Floats, like, norm, stack
 
 
 class Clone(MultiRobotTask):
@@ -38,6 +38,12 @@ class Clone(MultiRobotTask):
             return state.tcp_pose(robot)
         total: Any = sum(state.link_pose(robot, link) for link in links)
         return total / len(links)
+
+    def agent_tip_positions(self, state: State, robot: str) -> Floats:
+        """Return where a robot's tips are, (N, tips, 3) (m): its TCP if native's agent has none."""
+        links = self.layout.arm(robot).robot.native_agent.tip_links
+        tips = [state.link_position(robot, link) for link in links]
+        return stack(tips or [state.tcp_position(robot)], 1)
 
     def agent_is_static(self, state: State, robot: str, threshold: float) -> Flags:
         """Return native's ``agent.is_static(threshold)``, (N,) bool (rad/s)."""

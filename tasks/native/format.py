@@ -326,7 +326,7 @@ def _entries(simulation: Simulation) -> dict[str, dict[str, _Entry]]:
         joints = [declared[i] for i in built.loaded_order]
         articulations[key] = _jointed_entry(joints, *built.limits[list(built.loaded_order)].T)
     for name, body in _jointed(simulation).items():
-        ends = np.array([(joint.lower, joint.upper) for joint in body.joints])
+        ends = np.array([joint.limits for joint in body.joints])
         articulations[name] = _jointed_entry([joint.name for joint in body.joints], *ends.T)
     targets = {
         key: _Entry(tuple(f"number {i}" for i in range(k)), np.full(k, -FAR), np.full(k, FAR))

@@ -1,12 +1,13 @@
 """Joints of things: what they refuse, and where the parts that they move are."""
 
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 
 import numpy as np
 import pytest
 
 from objects import Joint, ObjectRegistry
+from objects.inspect import report
 from objects.shapes import Box
 from objects.solids import part_poses
 from robots import DescriptorError, UnknownNameError
@@ -33,6 +34,13 @@ HERE = np.array([[1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0]])
         ({"kind": "twist"}, "Joint: kind is 'twist'; it must be 'slide' or 'turn'"),
         ({"axis": (0.0, 0.0, 2.0)}, r"joint elbow: axis \(0.0, 0.0, 2.0\) must be of length 1"),
         ({"lower": 4.0}, "joint elbow: lower is 4, upper 3.14159; the lower one must be the small"),
+        ({"upper": None}, "joint elbow: one of lower and upper is None; a part that turns without"),
+        ({"kind": "slide", "lower": None, "upper": None}, "joint elbow: a part that slides must"),
+        (
+            {"axes": (1.0, 0.0, 0.0, 0.0)},
+            r"joint elbow: axes turns x to \(1.0, 0.0, 0.0\); it mu",
+        ),
+        ({"axes": (2.0, 0.0, 0.0, 0.0)}, "joint elbow: axes is .*, which has length 2"),
         ({"start": 4.0}, "joint elbow is 4.0; it must be a number from 0 to 3.14159 rad"),
         ({"parts": (replace(ARM, collides=False),)}, "joint elbow: no part collides"),
         ({"friction": -1.0}, "Joint: friction is -1.0; it must be a number from 0 to"),
@@ -64,6 +72,38 @@ def test_parts_are_where_their_joints_say():
     assert part_poses((SLIDE,), HERE, np.array([[0.5]]))["rod"][0, :3] == pytest.approx(
         [1.0, 2.3, 3.4]
     )
+
+
+def test_a_part_may_turn_without_end():
+    wheel = replace(TURN, lower=None, upper=None)
+    assert wheel.is_endless
+    assert wheel.limits == (-inf, inf)
+    assert wheel.check(-500.0) == -500.0
+    assert wheel.scaled(2.0).limits == (-inf, inf)
+    assert not TURN.is_endless
+    assert TURN.limits == (0.0, pi)
+    with pytest.raises(DescriptorError, match="joint elbow is inf; it must be a number from -1e"):
+        wheel.check(inf)
+    drawer = replace(ObjectRegistry.load("drawer"), joints=(wheel,))
+    assert "elbow  turns  without end" in report(drawer)
+
+
+def test_a_part_may_have_a_frame_of_its_own():
+    wrist = replace(BEYOND, origin=(0.2, 0.0, 0.05))
+    assert BEYOND.own_parts == BEYOND.parts
+    assert wrist.own_parts[0].position == pytest.approx((0.1, 0.0, -0.05))
+    assert wrist.scaled(2.0).origin == (0.4, 0.0, 0.1)
+    beyond = replace(
+        wrist, name="hand", carrier="wrist", origin=(0.3, 0.0, 0.0), at=(0.3, 0.0, 0.0)
+    )
+    plain = [replace(joint, origin=(0.0, 0.0, 0.0)) for joint in (TURN, wrist, beyond)]
+    angles = np.array([[pi / 2, pi / 3, pi / 4]])
+    found = part_poses((TURN, wrist, beyond), HERE, angles)
+    for name, pose in part_poses(plain, HERE, angles).items():
+        assert found[name][:, 3:] == pytest.approx(pose[:, 3:])
+    assert found["elbow"] == pytest.approx(part_poses(plain, HERE, angles)["elbow"])
+    assert found["wrist"][0, :3] == pytest.approx([1.0, 2.2, 3.05])
+    assert found["hand"][0, :3] == pytest.approx([1 - 0.1 * np.sin(pi / 3), 2.25, 3.0])
 
 
 def test_a_larger_thing_slides_farther_and_turns_as_far():

@@ -16,6 +16,7 @@ from robots import (
     GripperMaterial,
     Home,
     JointGroup,
+    NativeAgent,
     RobotRegistry,
     UnknownNameError,
 )
@@ -110,6 +111,7 @@ def test_a_descriptor_refuses_nonsense(changes, message):
         (lambda: ActionSplit(arm=None), "ActionSplit['arm'] is None; it must be a JointGroup"),
         (lambda: GripperMaterial(("a",), -1.0, 1.0), "static_friction is -1.0; it must not be"),
         (lambda: GripperMaterial(("a",), 1.0, 1.0, 2.0), "restitution is 2.0; it must be between"),
+        (lambda: NativeAgent(tip_links=("a", "a")), "NativeAgent: tip_links has a more than once"),
         (lambda: Fingers(("a",)), "Fingers: links has 1 entries; it must be a tuple of 2"),
         (lambda: Fingers(("a", "b"), (0, 1)), "opening_signs is (0, 1); each must be 1 or -1"),
         (

@@ -62,6 +62,32 @@ def test_what_hangs_falls_to_its_stop_and_what_holds_it_stays():
     assert state.position("post")[0].tolist() == [1.0, 0.0, 1.0]
 
 
+def test_what_turns_without_end_stops_nowhere():
+    simulation = jointed(turn(lower=None, upper=None, damping=0.05))
+    assert wait(simulation, 100).joint("post", "arm")[0] == pytest.approx(np.pi / 2, abs=0.1)
+    simulation.worlds[0].set_joints("post", arm=-3.0)
+    assert simulation.read().joint("post", "arm")[0] == -3.0
+    assert wait(simulation, 100).joint("post", "arm")[0] == pytest.approx(-np.pi * 3 / 2, abs=0.1)
+
+
+def test_a_part_that_has_a_frame_of_its_own_moves_as_without():
+    level = (0.0, 0.0, 0.02)
+    plain = jointed(turn(at=level, damping=0.02), turn(name="other", carrier="arm", start=0.5))
+    own = jointed(
+        turn(at=level, origin=level, damping=0.02),
+        turn(name="other", carrier="arm", start=0.5, origin=(0.1, 0.0, 0.0)),
+    )
+    for steps in (0, 6):
+        expected, found = wait(plain, steps), wait(own, steps)
+        joints = found.body_joints("post")
+        assert joints == pytest.approx(expected.body_joints("post"), abs=1e-3)
+        joints = own.worlds[0].bodies["post"].joints
+        places = part_poses(joints, found.pose("post"), found.body_joints("post")[:, :2])
+        for name, pose in places.items():
+            assert found.pose(f"post.{name}") == pytest.approx(pose, abs=1e-5)
+    assert found.position("post.arm")[0] == pytest.approx([1.0, 0.0, 1.02], abs=1e-6)
+
+
 def test_a_spring_pulls_it_where_it_is_slack():
     spring = turn(axis=(0.0, 0.0, 1.0), stiffness=5.0, damping=0.5, rest=0.6)
     assert wait(jointed(spring)).joint("post", "arm")[0] == pytest.approx(0.6, abs=1e-3)

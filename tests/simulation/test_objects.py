@@ -167,6 +167,15 @@ def test_grasps_hold_when_the_hand_is_shaken(name, opening):
     assert sum(one.holds for one in tried) >= max(FEWEST_GRASPS, 0.9 * len(tried))
 
 
+def test_a_seed_lets_the_hand_miss_and_shakes_along_other_axes():
+    thing = ObjectRegistry.load("mug")
+    plain, one, same, other = (try_thing_grasps(thing, 0.04, seed=s) for s in (None, 1, 1, 2))
+    assert one == same
+    assert len({tuple(seen.slipped for seen in tried) for tried in (plain, one, other)}) == 3
+    assert [seen.grasp for seen in one] == [seen.grasp for seen in plain]
+    assert sum(seen.holds for seen in other) >= 0.9 * len(other)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [None, 1, 2])
 @pytest.mark.parametrize("name", GRASPED)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from layouts import side_by_side, single
-from objects.shapes import Capsule, Cylinder
+from objects.joints import Joint
+from objects.shapes import Capsule, ConvexHull, Cylinder, Shape, scaled
 from robot_layouts.simulation import Box, PhysicsSettings, Simulation, Sphere, World, add_table
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robot_layouts.simulation.sapien3.blueprint import read_blueprint
@@ -49,6 +50,67 @@ def test_a_cylinder_lies_along_its_x_axis():
     body = world.add(WorldBody("rod", (Cylinder(radius=0.01, half_length=0.1),)))
     low, high = body.component.compute_global_aabb_tight()
     assert high - low == pytest.approx([0.2, 0.02, 0.02], abs=1e-3)
+
+
+CUBE = tuple((x, y, z) for x in (-HALF, HALF) for y in (-HALF, HALF) for z in (-HALF, HALF))
+
+
+@pytest.mark.parametrize(
+    "shape", [Box(half_size=(HALF,) * 3), Sphere(radius=HALF), ConvexHull(corners=CUBE)]
+)
+def test_patches_of_contact_resist_turning(shape: Shape):
+    """A body that spins on the table about the vertical is slowed by torsional friction alone."""
+    ball = dataclasses.replace(shape, patch_radius=0.1, min_patch_radius=0.03)
+
+    def build(world: World, number: int) -> None:
+        add_table(world)
+        world.add("ball", (shape, ball)[number], position=(0.0, 0.0, HALF))
+
+    simulation = Simulation(single({"arm": "panda"}), build, 2, PhysicsSettings())
+    stand(simulation)
+    bodies = [world.bodies["ball"].component for world in worlds_below(simulation)]
+    radii = [(x.patch_radius, x.min_patch_radius) for b in bodies for x in b.collision_shapes]
+    assert radii == [(0.0, 0.0), pytest.approx((0.1, 0.03))]
+    if isinstance(shape, Sphere):
+        for body in bodies:
+            body.set_angular_velocity([0.0, 0.0, 10.0])
+        simulation.touched()
+        simulation.coast(range(2))
+        free, held = simulation.read().angular_velocity("ball")[:, 2]
+        assert free > 9
+        assert held < free / 2
+
+
+def test_patches_of_contact_grow_with_their_shape():
+    shape = Sphere(radius=HALF, patch_radius=0.1, min_patch_radius=0.03)
+    larger = scaled(shape, 2.0)
+    assert (larger.patch_radius, larger.min_patch_radius) == (0.2, 0.06)
+
+
+def test_a_robot_that_presses_on_a_part_of_a_thing_touches_it():
+    flap = Joint(
+        name="flap",
+        kind="turn",
+        parts=(Box(half_size=(0.1, 0.1, 0.01)),),
+        axis=(0.0, 1.0, 0.0),
+        lower=-1.0,
+        upper=1.0,
+    )
+
+    def build(world: World, number: int) -> None:
+        x, y, z = places[number]
+        post = Box(half_size=(0.01, 0.01, 0.01), position=(0.0, 0.0, 0.0), collides=False)
+        world.add("door", post, kind="kinematic", position=(x, y, z), joints=(flap,))
+
+    tcp = Simulation(single({"arm": "panda"}), lambda *_: None, 1)
+    stand(tcp)
+    x, y, z = tcp.read().tcp_position("arm")[0].tolist()
+    places = [(x, y, z), (x, y + 1.0, z)]
+    simulation = Simulation(single({"arm": "panda"}), build, 2)
+    stand(simulation)
+    simulation.rest(simulation.read(), range(2))
+    simulation.coast(range(2))
+    assert simulation.backend.touching().tolist() == [True, False]
 
 
 def test_grasp_and_forces():

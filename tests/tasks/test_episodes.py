@@ -37,7 +37,7 @@ def test_types_and_shapes(each: TaskEnv):
     assert obs.shape == each.observation_space.shape == (2, *each.single_observation_space.shape)
     assert info["elapsed_steps"].tolist() == [0, 0]
     obs, reward, terminated, truncated, info = each.step(actions(each, 1)[0])
-    assert reward.dtype == torch.float32
+    assert reward.dtype == (torch.float64 if each.double_rewards else torch.float32)
     assert reward.shape == (2,)
     for flag in (terminated, truncated, info["success"]):
         assert flag.dtype == torch.bool

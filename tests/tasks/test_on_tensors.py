@@ -42,7 +42,7 @@ class TensorState(State):
     def __getattribute__(self, name):
         if name in ("_state", "num_envs"):
             return object.__getattribute__(self, name)
-        if name in ("array", "full", "among", "env_ids"):
+        if name in ("array", "doubles", "full", "among", "env_ids"):
             return State.__dict__[name].__get__(self)
         found = getattr(object.__getattribute__(self, "_state"), name)
         if not callable(found):

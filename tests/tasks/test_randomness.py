@@ -1,5 +1,6 @@
 import math
 
+import pytest
 import torch
 
 from tasks import EpisodeRandom
@@ -31,3 +32,21 @@ def test_a_yaw_may_be_bounded():
         yaws.append(2 * math.atan2(z, w))
     assert -math.pi / 6 <= min(yaws) < -0.4
     assert 0.4 < max(yaws) <= math.pi / 6
+
+
+def test_what_native_draws_by_functions_that_round_otherwise():
+    rng = EpisodeRandom(3)
+    torch.manual_seed(3)
+    assert torch.equal(rng.torch_uniform(-0.02, 0.02, 2), torch.zeros(2).uniform_(-0.02, 0.02))
+    assert torch.equal(rng.torch_standard_normal(9), torch.randn(1, 9)[0])
+    drawn = [rng.torch_whole(2, 5) for _ in range(20)]
+    assert drawn == [int(torch.randint(2, 5, (1,))) for _ in range(20)]
+    assert set(drawn) == {2, 3, 4}
+
+
+def test_a_uniform_draw_may_be_less_spread():
+    whole, half, none = EpisodeRandom(3), EpisodeRandom(3), EpisodeRandom(3)
+    half.spread, none.spread = 0.5, 0.0
+    drawn = whole.torch_uniform(1.0, 3.0, 4)
+    assert half.torch_uniform(1.0, 3.0, 4) == pytest.approx(2 + (drawn - 2) / 2)
+    assert none.torch_uniform(1.0, 3.0, 4).tolist() == [2.0] * 4

@@ -80,8 +80,12 @@ _ABSENT = "nothing"
 
 # Fields that digests of 0.2.0 lack, with their defaults.
 NEWER_FIELDS = {"no_floor_contact": (), "native_agent": NativeAgent()}
-# The same of joint groups and fingers, as they are written.
-NEWER_IN_PARTS = (", approximate_ik=False", ", opening_axes=((0.0, 1.0, 0.0), (0.0, 1.0, 0.0))")
+# The same of joint groups, fingers and native's agents, as they are written.
+NEWER_IN_PARTS = (
+    ", approximate_ik=False",
+    ", opening_axes=((0.0, 1.0, 0.0), (0.0, 1.0, 0.0))",
+    ", tip_links=()",
+)
 
 
 # What `describe_layout` and `describe_simulation` write, as far as it is read again.

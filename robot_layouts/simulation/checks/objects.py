@@ -25,6 +25,8 @@ from robot_layouts.kinematics.rotations import (
     pose_matrix,
     quaternion_of,
     rotate,
+    rotation_of,
+    rpy_pose,
 )
 from robot_layouts.simulation.checks.overlaps import stand
 from robot_layouts.simulation.physics import SAPIEN_DEFAULTS
@@ -50,6 +52,7 @@ _FREQUENCY = 100.0  # Hz
 _AJAR = 4e-3  # m; between each finger and what it is to hold, before it closes
 _CLOSING, _HOLDING, _SHAKING = 80, 20, 60  # steps; the last along each axis
 _SWAY, _PERIOD = 0.0125, 20  # m to both sides, and steps: 12 m/s²
+_MISSES, _LEANS = 2e-3, 0.05  # m and rad; by how much a hand may miss a grasp that is tried again
 _WEIGHTLESS = replace(SAPIEN_DEFAULTS, gravity=(0.0, 0.0, 0.0))
 _SQUEEZE = 0.05  # m by which fingers are driven beyond each other
 _NEXT_TO_NOTHING = 0.1  # kg/m³
@@ -154,7 +157,11 @@ def _rested(things: Sequence[ObjectDescriptor], time: float) -> list[RestTrial]:
 
 
 def try_thing_grasps(
-    thing: ObjectDescriptor, opening: float, grasps: Sequence[Grasp] | None = None
+    thing: ObjectDescriptor,
+    opening: float,
+    grasps: Sequence[Grasp] | None = None,
+    *,
+    seed: int | None = None,
 ) -> list[TriedGrasp]:
     """Grasp a thing with a flying hand of two jaws, and shake it along every axis.
 
@@ -165,6 +172,8 @@ def try_thing_grasps(
         thing: The thing.
         opening: How far the hand opens (m).
         grasps: Which grasps; None takes all that the hand opens wide enough for.
+        seed: Draws, for each grasp, by how much the hand misses it, up to 2 mm along and 0.05 rad
+            about each axis, and three other axes to shake along; None: it misses none.
 
     Raises:
         RobotLayoutsError: If it cannot be built.
@@ -175,7 +184,7 @@ def try_thing_grasps(
     heaviest = max(mass_of(_carried(thing, grasp)).mass for grasp in tried)
     with TemporaryDirectory() as folder:
         hand = two_jaw_hand(opening, Path(folder), _LEAST + _PER_MASS * heaviest)
-        return _shaken(thing, hand, tried)
+        return _shaken(thing, hand, tried, seed)
 
 
 def holding(thing: ObjectDescriptor, openings: Sequence[float] = OPENINGS) -> ObjectDescriptor:
@@ -197,9 +206,15 @@ def holding(thing: ObjectDescriptor, openings: Sequence[float] = OPENINGS) -> Ob
 
 
 def _shaken(
-    thing: ObjectDescriptor, hand: RobotDescriptor, grasps: Sequence[Grasp]
+    thing: ObjectDescriptor, hand: RobotDescriptor, grasps: Sequence[Grasp], seed: int | None
 ) -> list[TriedGrasp]:
     poses = [inverse_pose(pose_matrix(grasp.position, grasp.quaternion)) for grasp in grasps]
+    axes = np.tile(np.eye(3), (len(grasps), 1, 1))
+    if seed is not None:
+        rng = np.random.default_rng(seed)
+        poses = [_miss(rng) @ pose for pose in poses]
+        turns = rng.normal(size=(len(grasps), 4))
+        axes = rotation_of(turns / np.linalg.norm(turns, axis=1, keepdims=True))
 
     def build(world: World, number: int) -> None:
         place, turned = poses[number][:3, 3].tolist(), quaternion_of(poses[number][:3, :3])
@@ -221,7 +236,7 @@ def _shaken(
         action[:, :3], closed = 0.0, min(step / _CLOSING, 1.0)
         action[:, -1] = ajar + closed * (-1.0 - ajar)
         if axis >= 0:
-            action[:, axis] = np.sin(2 * np.pi * at / _PERIOD)
+            action[:, :3] = axes[:, axis] * np.sin(2 * np.pi * at / _PERIOD)
         simulation.step(action, simulation.read().joint_positions)
         if step == _CLOSING + _HOLDING - 1:
             held = _in_hand(simulation, places)
@@ -237,6 +252,11 @@ def _shaken(
         )
         for i, grasp in enumerate(grasps)
     ]
+
+
+def _miss(rng: np.random.Generator) -> Floats:
+    """Return by how much a hand misses a thing, (4, 4)."""
+    return rpy_pose(rng.uniform(-_MISSES, _MISSES, 3), rng.uniform(-_LEANS, _LEANS, 3).tolist())
 
 
 def _held(thing: ObjectDescriptor, grasp: Grasp) -> list[Shape]:

@@ -87,13 +87,15 @@ class BodyMaker:
             made.add_freejoint(name=PREFIX + body.name)
         self._add_shapes(made, body.shapes, marker=body.marker)
         parts: dict[str | None, Any] = {None: made}
+        origins = {None: (0.0, 0.0, 0.0), **{joint.name: joint.origin for joint in body.joints}}
         for joint in body.joints:
             carrier = parts[joint.carrier]
-            part = carrier.add_body(name=PREFIX + part_name(body.name, joint.name))
+            place = np.subtract(joint.origin, origins[joint.carrier])
+            part = carrier.add_body(name=PREFIX + part_name(body.name, joint.name), pos=place)
             # What a joint joins does not collide.
             self.spec.add_exclude(bodyname1=carrier.name, bodyname2=part.name)
             part.add_joint(name=part.name, solref_limit=self.solref, **_joint_numbers(joint))
-            self._add_shapes(part, joint.parts, marker=body.marker)
+            self._add_shapes(part, joint.own_parts, marker=body.marker)
             parts[joint.name] = part
 
     def _add_shapes(self, body: Any, shapes: tuple[Shape, ...], *, marker: bool) -> None:
@@ -176,8 +178,8 @@ def _joint_numbers(joint: Joint) -> dict[str, Any]:
     return {
         "type": _KINDS[joint.kind],
         "axis": joint.axis,
-        "pos": joint.at,
-        "range": [joint.lower, joint.upper],
+        "pos": np.subtract(joint.at, joint.origin),
+        **({} if joint.is_endless else {"range": list(joint.limits)}),
         "stiffness": joint.stiffness,
         "springref": joint.rest,
         "damping": joint.damping,

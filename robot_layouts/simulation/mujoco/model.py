@@ -37,6 +37,7 @@ class RobotModels:
     Attributes:
         cell: The robots.
         timestep: The longest one at which all drives are stable (s).
+        meshes: Their meshes, by the names of files that they would have.
     """
 
     def __init__(self, layout: Layout, *, visuals: bool) -> None:
@@ -51,12 +52,28 @@ class RobotModels:
             folder = Path(name)
             model = mjcf_of(self.cell, "worlds", folder, visuals=visuals)
             files = [path for path in folder.rglob("*") if path.is_file()]
-            meshes = {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
+            self.meshes = {file.relative_to(folder).as_posix(): file.read_bytes() for file in files}
         self.timestep = model.timestep
-        self._spec: Any = mujoco.MjSpec.from_string(model.text(""), assets=meshes)
+        self._spec: Any = mujoco.MjSpec.from_string(model.text(""), assets=self.meshes)
 
     def compile(self, world: World) -> Any:
         """Return MuJoCo's model of a world.
+
+        Raises:
+            SimulationError: If its physics settings ask for what MuJoCo does not have.
+        """
+        model = self.describe(world, drawn=bool(world.visuals)).compile()
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        _drive_by_force(model)
+        rub_joints(model, world)
+        return model
+
+    def describe(self, world: World, *, drawn: bool) -> Any:
+        """Return MuJoCo's description of a model of a world.
+
+        Args:
+            world: The world.
+            drawn: Whether it has what pictures need.
 
         Raises:
             SimulationError: If its physics settings ask for what MuJoCo does not have.
@@ -68,22 +85,18 @@ class RobotModels:
         option = spec.option
         option.timestep, option.gravity = step, settings.gravity
         option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, _IMPRATIO
-        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         for joint in spec.joints:
             joint.solref_limit = solref
         self._set_friction(spec, settings.friction.static)
-        maker = BodyMaker(spec, settings.friction, solref, drawn=bool(world.visuals))
+        maker = BodyMaker(spec, settings.friction, solref, drawn=drawn)
         for body in world.bodies.values():
             if body.part_of is None:
                 maker.add(body)
-        if maker.drawn:
+        if drawn:
             add_lamps(spec, shadows=world.shadows)
         set_friction(spec, world, settings.friction.static, solref)
         self._let_floors_through(spec, world)
-        model = spec.compile()
-        _drive_by_force(model)
-        _rub_joints(model, world)
-        return model
+        return spec
 
     def _set_friction(self, spec: Any, friction: float) -> None:
         """Give links whose descriptor names no material that of the world."""
@@ -141,7 +154,7 @@ def _drive_by_force(model: Any) -> None:
     model.dof_damping[driven] = model.dof_frictionloss[driven] = 0.0
 
 
-def _rub_joints(model: Any, world: World) -> None:
+def rub_joints(model: Any, world: World) -> None:
     """Let joints of things rub with their coefficient of the weight that they carry.
 
     PhysX takes what they bear at every moment; of a drawer that lies level that is the same.

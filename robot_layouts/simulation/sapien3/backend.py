@@ -192,7 +192,9 @@ class SapienBackend(EachWorld):
 
     def touching(self) -> Flags:
         """Tell where a link pressed on a dynamic body; see `Backend`."""
-        return np.array([presses_on_object(world.system.get_contacts()) for world in self.worlds])
+        return np.array(
+            [presses_on_object(w.system.get_contacts(), w.articulations) for w in self.worlds]
+        )
 
     def extents(self, env: int) -> dict[Part, Floats]:
         """Return the box around what collides; see `Backend`."""

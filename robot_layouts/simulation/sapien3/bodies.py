@@ -12,7 +12,8 @@ import sapien.physx as physx
 from numpy.typing import NDArray
 from sapien.wrapper.articulation_builder import ArticulationBuilder
 
-from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Shape, Sphere
+from objects.joints import Joint
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Place, Plane, Shape, Sphere
 from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.sapien3.blueprint import FLOOR
 from robot_layouts.simulation.sapien3.builder import joint_frame
@@ -20,6 +21,7 @@ from robot_layouts.simulation.world import WorldBody, part_name
 
 _STILL = np.zeros(3, np.float32)
 _KINDS = {"slide": "prismatic", "turn": "revolute_unwrapped"}
+_ORIGIN = (0.0, 0.0, 0.0)
 
 
 @dataclass(eq=False)
@@ -148,7 +150,7 @@ def build_bodies(scene: sapien.Scene, body: WorldBody, *, visuals: bool) -> Iter
     yield JointedBody(body, articulation, pose)
     for joint in body.joints:
         name = part_name(body.name, joint.name)
-        declared = WorldBody(name, joint.parts, marker=body.marker, part_of=body.name)
+        declared = WorldBody(name, joint.own_parts, marker=body.marker, part_of=body.name)
         yield BuiltPart(declared, links[name].entity, links[name], links[name].entity.pose)
 
 
@@ -175,6 +177,7 @@ def _articulation(scene: sapien.Scene, body: WorldBody, pose: sapien.Pose) -> An
     builder: Any = ArticulationBuilder()
     builder.set_initial_pose(pose)
     made: dict[str | None, Any] = {}
+    origins = {None: _ORIGIN, **{joint.name: joint.origin for joint in body.joints}}
     for joint, (name, shapes) in zip((None, *body.joints), _links(body), strict=True):
         link = builder.create_link_builder(joint and made[joint.carrier])
         made[joint and joint.name] = link
@@ -185,18 +188,28 @@ def _articulation(scene: sapien.Scene, body: WorldBody, pose: sapien.Pose) -> An
             held = "undefined" if body.kind == "dynamic" else "fixed"
             link.set_joint_properties(held, [], sapien.Pose(), sapien.Pose())
         else:
-            frame = joint_frame(joint.axis, joint.at)
             link.set_joint_name(joint.name)
-            limits = [[joint.lower, joint.upper]]
-            link.set_joint_properties(_KINDS[joint.kind], limits, frame, frame)
+            limits = [list(joint.limits)]
+            carrier = origins[joint.carrier]
+            frames = _joint_frame(joint, carrier), _joint_frame(joint, joint.origin)
+            kind = "revolute" if joint.is_endless else _KINDS[joint.kind]
+            link.set_joint_properties(kind, limits, *frames)
     articulation = builder.set_scene(scene).build()
     articulation.name = body.name
     return articulation
 
 
+def _joint_frame(joint: Joint, origin: Place) -> sapien.Pose:
+    """Return the pose of a joint's frame in that of a link which begins at ``origin`` (m)."""
+    x, y, z = (at - begun for at, begun in zip(joint.at, origin, strict=True))
+    if joint.axes is not None:
+        return sapien.Pose([x, y, z], list(joint.axes))
+    return joint_frame(joint.axis, (x, y, z))
+
+
 def _links(body: WorldBody) -> list[tuple[str, tuple[Shape, ...]]]:
     """Return the names and shapes of a jointed body's links, its root's first."""
-    parts = [(part_name(body.name, joint.name), joint.parts) for joint in body.joints]
+    parts = [(part_name(body.name, joint.name), joint.own_parts) for joint in body.joints]
     return [(body.name, body.shapes), *parts]
 
 
@@ -239,7 +252,8 @@ def add_collision(builder: Any, shape: Shape) -> None:
             sizes = {"filename": str(shape.file), "scale": list(shape.scale)}
         case _:
             raise TypeError(f"no collision for {type(shape).__name__}")
-    add(density=shape.density, **common, **sizes)
+    patch = {"patch_radius": shape.patch_radius, "min_patch_radius": shape.min_patch_radius}
+    add(density=shape.density, **common, **patch, **sizes)
 
 
 # SAPIEN's builder's methods.
@@ -264,6 +278,8 @@ def attach_hulls(component: Any, shapes: tuple[Shape, ...]) -> None:
             )
             hull.local_pose = _pose(shape)
             hull.set_density(shape.density)
+            hull.set_patch_radius(shape.patch_radius)
+            hull.set_min_patch_radius(shape.min_patch_radius)
             component.attach(hull)
 
 

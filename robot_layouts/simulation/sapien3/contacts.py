@@ -131,18 +131,25 @@ def overlaps_in(world: BuiltWorld) -> list[Overlap]:
     return found
 
 
-def presses_on_object(contacts: Sequence[Any]) -> bool:
-    """Tell whether a contact that carries force joins a link and a body that physics moves."""
+def presses_on_object(contacts: Sequence[Any], robots: Sequence[Any]) -> bool:
+    """Tell whether a contact that carries force joins a robot and a body that physics moves.
+
+    Args:
+        contacts: SAPIEN's.
+        robots: Articulations of the robots; the links of others are bodies, or parts of some.
+    """
     return any(
-        sorted(map(_kind, contact.bodies)) == ["link", "movable"]
+        sorted(_kind(body, robots) for body in contact.bodies) == ["link", "movable"]
         and any(np.any(point.impulse) for point in contact.points)
         for contact in contacts
     )
 
 
-def _kind(body: Any) -> str:
-    if hasattr(body, "articulation"):
-        return "link"
+def _kind(body: Any, robots: Sequence[Any]) -> str:
+    if (articulation := getattr(body, "articulation", None)) is not None:
+        if articulation in robots:
+            return "link"
+        return "fixed" if body.joint.type == "fixed" else "movable"
     return "fixed" if getattr(body, "kinematic", True) else "movable"
 
 

@@ -247,11 +247,23 @@ class Studio:
             sapien.render.set_ray_tracing_denoiser("optix")
         *lens, intrinsic = key
         camera = self._scene.add_camera(*lens)
+        if shaders not in RAY_TRACING:
+            camera.set_texture(*_no_reflections())
         if intrinsic is not None:
             (fx, _, cx), (_, fy, cy), _ = intrinsic
             camera.set_focal_lengths(fx, fy)
             camera.set_principal_point(cx, cy)
         return camera
+
+
+def _no_reflections() -> tuple[str, Any]:
+    """Return the name and the pixels of a table of how surfaces reflect what surrounds a scene.
+
+    That is black here, so no picture depends on the table; but a process in which a camera has none
+    of its own computes it before its first picture, which takes a software driver 8 s of a core.
+    """
+    black = np.zeros((1, 1, 4), np.float32)
+    return "BRDFLUT", sapien.render.RenderTexture(black, 2, "R32G32B32A32Sfloat")
 
 
 class _PlacedCamera(NamedTuple):
