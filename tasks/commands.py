@@ -25,7 +25,7 @@ from tasks.description import (
 from tasks.registry import list_tasks, load_tasks, make
 from tasks.view import task_cell
 
-MIN_WIDTH = 140  # columns that a table may take; a narrower terminal wraps it
+MIN_WIDTH = 156  # columns that a table may take; a narrower terminal wraps it
 LEGEND = (
     "norm is normalized_dense; the first reward mode is the default. parity: the last recorded"
     " comparison with native ManiSkill, where there was one; obs is the size recorded there."

@@ -110,10 +110,15 @@ def declared_facts(task_id: str, observation_size: int | None = None) -> TaskFac
 
 
 def robots_text(layout: Layout) -> str:
-    """Return a layout's robots in words, in order: ``2 × panda_wristcam``; how many, if long."""
+    """Return a layout's robots in words, in order: ``2 × panda_wristcam``.
+
+    How many they are, if that is long and there are several.
+    """
     counts = Counter(placement.robot.name for placement in layout.values())
     words = " + ".join(f"{n} × {name}" if n > 1 else name for name, n in counts.items())
-    return words if len(words) <= LONG else f"{len(layout)} robots of {len(counts)} kinds"
+    if len(words) <= LONG or len(layout) == 1:
+        return words
+    return f"{len(layout)} robots of {len(counts)} kinds"
 
 
 def parity_verdicts(path: Path = PARITY_RESULTS) -> dict[str, str]:

@@ -52,6 +52,8 @@ def test_list_has_a_row_for_every_task(capsys, only_pick_cube_recorded):
     )
     assert rows["TwoRobotPickCube-v1"][1:7] == ["2", "×", "panda_wristcam", "16", "66", "100"]
     assert rows["TwoRobotPickCube-v1"][-2:] == ["–", "robot-layouts"]
+    robot = "unitree_g1_simplified_upper_body_with_head_camera"
+    assert rows["UnitreeG1PlaceAppleInBowl-v1"][1:3] == [robot, "25"]
 
 
 @pytest.mark.parametrize("task_id", quick_cases(CATALOGUE))
