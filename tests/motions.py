@@ -9,6 +9,7 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from math import atan2, cos, pi, sin
 
 import numpy as np
+import sapien
 
 import tasks
 from robot_layouts.simulation.sapien3.arms import SapienArm
@@ -192,6 +193,60 @@ def push_t(puppeteer: Puppeteer) -> None:
         puppeteer.move(4, OPEN, {"arm": ((x + 0.08 * dx, y + 0.08 * dy, 0.12), hand)})
 
 
+def bend(puppeteer: Puppeteer, steps: int, joints: Mapping[str, float]) -> None:
+    """Move all joints of a robot towards some positions (rad) for some steps; 0 if left out."""
+    robot = puppeteer.world.robots["robot"]
+    (group,) = robot.descriptor.action_split.groups.values()
+    goal = np.array([joints.get(joint, 0.0) for joint in group.joints])
+    widest = np.array([upper for _, upper in group.ranges])
+    for _ in range(steps):
+        delta = (goal - robot.articulation.qpos[robot.active_index]) / widest
+        puppeteer.play(np.clip(delta, -1.0, 1.0).astype(np.float32))
+
+
+def lift_box(puppeteer: Puppeteer) -> None:
+    """Turn to the box, press both hands on it, turn on with it, and let it go."""
+    for steps, turn, roll, pitch in (
+        (14, -1.55, 1.25, 0.0),
+        (6, -1.55, 1.25, 0.3),
+        (14, -1.55, -0.3, 0.3),
+        (16, 1.45, -0.4, 0.3),
+        (6, 1.45, 1.25, 0.3),
+    ):
+        joints = {"left_shoulder_roll_joint": roll, "right_shoulder_roll_joint": -roll}
+        for side in ("left", "right"):
+            joints |= {f"{side}_shoulder_pitch_joint": pitch, f"{side}_elbow_pitch_joint": -0.2}
+        bend(puppeteer, steps, {"torso_joint": turn, **joints})
+
+
+def close_on_apple(puppeteer: Puppeteer) -> None:
+    """Bring the right hand over the apple, down on it, close it, and push."""
+    (x, y, z), _ = puppeteer.place("apple")
+    fingers = {f"right_{number}_joint": 1.4 for number in ("three", "four", "five", "six")}
+    fingers |= {"right_one_joint": -0.5, "right_two_joint": -0.8}
+    for steps, place, closed in (
+        (14, (x - 0.08, y + 0.006, z + 0.138), {}),
+        (14, (x, y + 0.006, z + 0.018), {}),
+        (10, (x, y + 0.006, z + 0.018), fingers),
+        (8, (x + 0.05, y + 0.056, z + 0.018), fingers),
+    ):
+        bend(puppeteer, steps, right_arm_at(puppeteer, place) | closed)
+
+
+def right_arm_at(puppeteer: Puppeteer, position: Sequence[float]) -> dict[str, float]:
+    """Return the joints (rad) of a humanoid's right arm that bring its hand to a place (m)."""
+    robot = puppeteer.world.robots["robot"]
+    model = robot.articulation.create_pinocchio_model()
+    hand = [link.name for link in robot.articulation.links].index("right_tcp_link")
+    names = [joint.name for joint in robot.joints]
+    arm = np.array([name.startswith(("right_shoulder", "right_elbow")) for name in names])
+    goal = robot.base_pose.inv() * sapien.Pose(list(position), [0.837, 0.478, 0.254, 0.081])
+    joints, *_ = model.compute_inverse_kinematics(
+        hand, goal, initial_qpos=np.zeros(len(names)), active_qmask=arm.astype(int)
+    )
+    return {name: q for name, q, own in zip(names, joints.tolist(), arm, strict=True) if own}
+
+
 def turn_valve(puppeteer: Puppeteer) -> None:
     """Swing all fingers to and fro, so that they push the spokes; found by trying."""
     swing = np.repeat([1.19, 0.11, -0.41], 3)  # of the fingers' first joints, second and third
@@ -228,6 +283,8 @@ MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
     "PushT-v1": push_t,
     **{f"RotateValveLevel{level}-v1": turn_valve for level in range(5)},
     "TwoRobotPickCube-v1": two_robot_pick_cube,
+    "UnitreeG1PlaceAppleInBowl-v1": close_on_apple,
+    "UnitreeG1TransportBox-v1": lift_box,
 }
 
 

@@ -39,7 +39,12 @@ SAMPLE = (
     ("PushT-v1", "pd_joint_pos_vel"),
 )
 ARMS = ("PickCube-v1", "TwoRobotPickCube-v1", "StackCube-v1", "PegInsertionSide-v1", "PushT-v1")
-EVERY = (*product(TASKS, ["pd_joint_pos"]), *product(ARMS, CONTROL_MODES[2:]))
+# Random positions drive its light fingers against the counter, where physics diverges.
+DIVERGES = ("UnitreeG1PlaceAppleInBowl-v1",)
+EVERY = (
+    *((task_id, "pd_joint_pos") for task_id in TASKS if task_id not in DIVERGES),
+    *product(ARMS, CONTROL_MODES[2:]),
+)
 MIXED = {"left": "pd_ee_target_delta_pose", "right": "pd_joint_pos"}
 
 

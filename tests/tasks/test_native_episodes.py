@@ -21,6 +21,10 @@ OTHER_NOISE = {
         ("PlugCharger-v1", *(f"RotateValveLevel{level}-v1" for level in range(5))),
         "native draws its joint noise from torch's global stream",
     ),
+    **dict.fromkeys(
+        ("UnitreeG1PlaceAppleInBowl-v1", "UnitreeG1TransportBox-v1"),
+        "native starts them without joint noise",
+    ),
 }
 
 
