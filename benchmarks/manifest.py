@@ -17,7 +17,7 @@ from robot_layouts.core.errors import AssetError
 from robot_layouts.core.files import read_regular, read_text
 from robot_layouts.core.paths import CHECKOUT_CACHE
 from robot_layouts.core.writing import write_whole
-from robots.assets.locator import GROUND_TEXTURE, SCENERY, TABLE, UrdfLocator
+from robots.assets.locator import GROUND_TEXTURE, SCENERY, TABLE, TASK_FILES, UrdfLocator
 from robots.assets.manifest import (
     INDEX_PACKAGES,
     MANI_SKILL,
@@ -34,9 +34,12 @@ from robots.assets.manifest import (
 from robots.mjcf.reading import files_of
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import UrdfReferences, read_references
+from tasks import get_task_class, list_clones
+from tasks.language.bodies import files_of
 
 LARGEST_FILE = 2**28  # bytes
 ALL_ROBOTS = "robots"  # maniskill_robots: for a URDF that uses files of several robots' folders
+TASK_FOLDERS = {"maniskill_fmb": "mani_skill/envs/tasks/fmb/assets"}
 LICENCE_FILES = ("LICENSE", "LICENSE.txt")
 README = "README.md"
 TERMS = {
@@ -74,7 +77,7 @@ def manifest(*, check: bool = False) -> int:
 
 
 def build_manifest() -> AssetManifest:
-    """Return the manifest of what the catalogue's URDFs need, of the scenery, and of objects.
+    """Return the manifest of what URDFs of the catalogue need, of scenery, tasks and objects.
 
     What is of an index package that is not installed is taken from the manifest that there is.
 
@@ -91,7 +94,8 @@ def build_manifest() -> AssetManifest:
     packages = {name: _build_or_keep(name, urdfs[name]) for name in urdfs}
     scenes = build_scenery(find_package(MANI_SKILL.name))
     things = {f"{package.prefix}objects": build_objects(package) for package in OBJECT_PACKAGES}
-    return AssetManifest({**packages, SCENERY: scenes, **things})
+    parts = {name: build_parts(name, find_package(MANI_SKILL.name)) for name in TASK_FILES}
+    return AssetManifest({**packages, SCENERY: scenes, **parts, **things})
 
 
 def to_json(manifest: AssetManifest) -> str:
@@ -143,6 +147,29 @@ def build_scenery(installed: Path) -> AssetPackage:
     origin = _origin(MANI_SKILL, SCENERY, inside, "scene", _licence(folder))
     paths = sorted(locator.file for locator in (TABLE, GROUND_TEXTURE))
     return AssetPackage(origin, tuple(_asset_file(origin, folder, p, set(), set()) for p in paths))
+
+
+def build_parts(name: str, installed: Path) -> AssetPackage:
+    """Return the package of what bodies of cloned tasks are made of.
+
+    Args:
+        name: One of `TASK_FILES`.
+        installed: Folder that mani_skill is installed in.
+
+    Raises:
+        AssetError: If mani_skill lacks one of its files.
+    """
+    folder = installed / (inside := TASK_FOLDERS[name])
+    origin = _origin(MANI_SKILL, name, inside, "object", _licence(folder))
+    bodies = [body for task in list_clones() for body in get_task_class(task).bodies.values()]
+    found = [(file.file, needed) for file, needed in files_of(bodies) if file.package == name]
+    physics = {path for path, needed in found if needed}
+    pictures = {path for path, _ in found} - physics
+    files = (
+        _asset_file(origin, folder, path, {path} & physics, {path} & pictures)
+        for path in sorted(physics | pictures)
+    )
+    return AssetPackage(origin, tuple(files))
 
 
 def build_objects(package: IndexPackage) -> AssetPackage:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from robot_layouts.core.bounds import FAR, checked_number, expect_unit
 from robot_layouts.core.errors import SimulationError
 from robot_layouts.core.schema import check_fields, within
+from robots.assets.locator import FileLocator
 from robots.descriptor import IDENTITY, Quaternion
 from robots.urdf.mesh_files import has_volume
 
@@ -22,6 +23,9 @@ Density = Annotated[float, within(1e-3, 1e6, "kg/m³")]
 Coordinate = Annotated[float, within(-FAR, FAR, "m")]
 Place = tuple[Coordinate, Coordinate, Coordinate]
 Factor = Annotated[float, within(1e-6, FAR)]
+
+Collision = Literal["hull", "parts", "surface"]
+"""What of a mesh collides; see `Mesh`."""
 
 GREY: Color = (0.7, 0.7, 0.7, 1.0)
 FEWEST_CORNERS, MOST_CORNERS = 4, 64  # of a hull; PhysX takes as many on any processor
@@ -207,17 +211,31 @@ class Plane(Shape):
 
 @dataclass(frozen=True)
 class Mesh(Shape):
-    """A mesh file; its convex hull collides.
+    """A mesh file.
 
     Attributes:
-        file: Mesh file.
+        file: Mesh file, or where the manifest lists it: then it is fetched when it is needed.
         scale: Scale along x, y, z.
         textured: Whether it is drawn as its file says; else in ``color``, with the file's finish.
+        collision: What of it collides: its convex ``"hull"``; the hulls of its ``"parts"``, which
+            share no corner in the file; or its ``"surface"`` with all its hollows, of bodies that
+            physics does not move, in SAPIEN alone.
     """
 
-    file: Path | str
+    file: FileLocator | Path | str
     scale: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
     textured: bool = False
+    collision: Collision = field(default="hull", repr=False)
+
+    @property
+    def path(self) -> Path:
+        """Where the file is on this machine.
+
+        Raises:
+            AssetError: If the manifest lists it, and no source has it.
+            UnknownNameError: If the manifest does not list it, though it should.
+        """
+        return self.file.locate() if isinstance(self.file, FileLocator) else Path(self.file)
 
 
 @dataclass(frozen=True)

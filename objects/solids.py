@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from objects.joints import Joint
-from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Place, Shape, Sphere
+from objects.shapes import Box, Capsule, Collision, ConvexHull, Cylinder, Mesh, Place, Shape, Sphere
 from robot_layouts.core.errors import DescriptorError
 from robot_layouts.kinematics.rotations import (
     Floats,
@@ -23,6 +23,7 @@ from robot_layouts.kinematics.rotations import (
     transform,
 )
 from robots.descriptor import Quaternion
+from robots.urdf.mesh_files import read_parts
 
 SIDES = 32  # of the polygon that stands for a circle where a surface is wanted
 _WHOLE = 1e9  # nanometres are whole numbers
@@ -311,7 +312,8 @@ def _surface(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
         case Box():
             return _BOX * shape.half_size, hull_triangles(tuple(map(tuple, _BOX.tolist())))
         case Mesh():
-            return _file(str(shape.file), shape.scale, shape.collides)
+            collision = shape.collision if shape.collides else "surface"
+            return _file(str(shape.path), shape.scale, collision)
         case _:
             return _round(shape)
 
@@ -334,13 +336,23 @@ def _round(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
 
 
 @lru_cache(maxsize=64)
-def _file(file: str, scale: Place, collides: bool) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the surface of a mesh file; of one that collides its convex hull, which does so."""
+def _file(file: str, scale: Place, collision: Collision) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the surface of what of a mesh file collides."""
     import trimesh
 
+    if collision == "parts":
+        return _hulls(read_parts(file, scale, file))
     try:
         loaded: Any = trimesh.load(file, force="mesh")
-        found: Any = trimesh.convex.convex_hull(loaded) if collides else loaded
+        found: Any = trimesh.convex.convex_hull(loaded) if collision == "hull" else loaded
     except Exception as error:  # whatever the reader of this format raises
         raise DescriptorError(f"{file} cannot be read as a mesh: {error}") from error
     return np.asarray(found.vertices, float) * scale, np.asarray(found.faces, np.intp)
+
+
+def _hulls(parts: Sequence[Floats]) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the surfaces of the convex hulls of parts, (n, 3) (m) each, as one."""
+    starts = np.cumsum([0, *map(len, parts)])
+    hulls = [hull_triangles(tuple(map(tuple, part.tolist()))) for part in parts]
+    triangles = [hull + start for hull, start in zip(hulls, starts, strict=False)]
+    return np.concatenate(parts), np.concatenate(triangles)

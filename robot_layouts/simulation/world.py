@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import cos, isfinite, pi, sin
 from typing import Any, Literal, NamedTuple, get_args
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
+from objects.colliding import built_of
 from objects.joints import Joint, checked_joints
 from objects.shapes import Box, Floor, Mesh, Plane, Shape, scaled
 from robot_layouts.core.bounds import checked_choice, expect_unit, shown
@@ -211,6 +212,7 @@ class World:
 
         Raises:
             SimulationError: If the name is taken, or something is not what it must be.
+            AssetError: If the file of a mesh that collides is missing or cannot be read.
             DescriptorError: If two joints have the same name.
             UnknownNameError: If a joint is carried by none of those before it.
         """
@@ -223,6 +225,12 @@ class World:
         if (size := scale * self.size) != 1.0:
             shapes = tuple(scaled(shape, size) for shape in shapes)
             joints = tuple(joint.scaled(size) for joint in joints)
+        moves = kind == "dynamic" or bool(joints)
+        shapes = self._built(name, shapes, moves=moves)
+        joints = tuple(
+            replace(joint, parts=self._built(part_name(name, joint.name), joint.parts, moves=True))
+            for joint in joints
+        )
         body = WorldBody(
             name, shapes, kind, position, quaternion, anchored, marker, scale, size, joints
         )
@@ -317,6 +325,16 @@ class World:
                     " Capsule, ConvexHull, Mesh and Plane"
                 )
         checked_choice(f"body {name!r}: kind", kind, _KINDS, SimulationError)
+
+    def _built(self, name: str, shapes: tuple[Shape, ...], *, moves: bool) -> tuple[Shape, ...]:
+        """Return what is built of a body's shapes; ``moves`` tells whether physics moves it."""
+        for shape in shapes if moves else ():
+            if isinstance(shape, Mesh) and shape.collides and shape.collision == "surface":
+                raise SimulationError(
+                    f"body {name!r}: the mesh {shape.file} collides by its surface, which physics"
+                    " cannot move; take collision='hull' or 'parts', or another kind of body"
+                )
+        return tuple(part for shape in shapes for part in built_of(shape, f"body {name!r}"))
 
     def _pose(self, body: str, position: Any, quaternion: Any) -> list[float]:
         place = self._floats(position, 3, f"position of body {body!r}", "m")

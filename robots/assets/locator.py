@@ -10,6 +10,8 @@ from robot_layouts.core.paths import absolute
 
 # What stands around robots in pictures; physics needs none of it.
 SCENERY = "maniskill_tabletop"  # a package of the manifest
+# What bodies of tasks are made of; likewise.
+TASK_FILES = ("maniskill_fmb",)
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,10 @@ class FileLocator:
 
     package: str
     file: str
+
+    def __str__(self) -> str:
+        """Return package and file."""
+        return f"{self.package}/{self.file}"
 
     def locate(self) -> Path:
         """Return the path of the file, fetched and checked.

@@ -144,23 +144,74 @@ def read_corners(path: str, scale: Sequence[float], where: str, urdf: str) -> Fl
         AssetError: If it cannot be read (see `load_scene`), is empty or flat, or has corners that
             are not finite or more than `LARGEST` away.
     """
-    import numpy as np
-
-    scene = load_scene(path, where, urdf, process=False)
-    try:
-        mesh = scene.to_mesh()
-        corners = np.asarray(mesh.vertices, float).reshape(-1, 3) * scale
-    except Exception as error:  # what the reader left behind may be anything
-        raise AssetError(f"{where}: cannot read the mesh {path}: {_line(error)}") from error
-    if len(corners) == 0 or len(mesh.faces) == 0:
-        raise AssetError(f"{where}: the mesh {path} is empty, or damaged")
-    expect_near(corners, path, where)
+    corners, _ = _read_surface(path, scale, where, urdf)
     if not has_volume(corners):
         raise _NoVolumeError(
             f"{where}: the mesh {path} is a collision shape without a volume: all its corners lie"
             " in one plane"
         )
     return corners
+
+
+def _read_surface(
+    path: str, scale: Sequence[float], where: str, urdf: str
+) -> tuple[Floats, Floats]:
+    """Return corners, (n, 3) (m), and triangles, (t, 3), of a mesh, as its file numbers them."""
+    import numpy as np
+
+    scene = load_scene(path, where, urdf, process=False)
+    try:
+        mesh = scene.to_mesh()
+        corners = np.asarray(mesh.vertices, float).reshape(-1, 3) * scale
+        triangles = np.asarray(mesh.faces, np.intp).reshape(-1, 3)
+    except Exception as error:  # what the reader left behind may be anything
+        raise AssetError(f"{where}: cannot read the mesh {path}: {_line(error)}") from error
+    if len(corners) == 0 or len(triangles) == 0:
+        raise AssetError(f"{where}: the mesh {path} is empty, or damaged")
+    expect_near(corners, path, where)
+    return corners, triangles
+
+
+def read_parts(path: str, scale: Sequence[float], where: str) -> tuple[Floats, ...]:
+    """Return the corners of each part of a mesh that hangs together, (n, 3) each (m).
+
+    What hangs together shares corners as the file numbers them: parts that only touch are told
+    apart. A file is read once by a process, and again if it changes.
+
+    Args:
+        path: The file.
+        scale: Factors along x, y and z.
+        where: What refers to it, for messages.
+
+    Raises:
+        AssetError: If it cannot be read (see `read_corners`), or one of its parts is flat.
+    """
+    return _read_parts(path, _identity(path), tuple(scale), where)
+
+
+@lru_cache(maxsize=256)
+def _read_parts(
+    path: str, identity: tuple[int, ...], scale: tuple[float, ...], where: str
+) -> tuple[Floats, ...]:
+    import numpy as np
+
+    corners, triangles = _read_surface(path, scale, where, path)
+    lowest, before = np.arange(len(corners)), None  # corner that each one hangs together with
+    while not np.array_equal(lowest, before):
+        before = lowest.copy()
+        np.minimum.at(lowest, triangles, lowest[triangles].min(axis=1, keepdims=True))
+    used = np.unique(triangles)
+    parts = [corners[used[lowest[used] == first]] for first in np.unique(lowest[used])]
+    flat = sum(not has_volume(part) for part in parts)
+    if flat:
+        raise AssetError(
+            f"{where}: {flat} of the {len(parts)} parts of the mesh {path} have no volume; the"
+            " triangles of a part share corners in the file (in a GLB or STL they often do not;"
+            " save it as PLY)"
+        )
+    for part in parts:
+        part.setflags(write=False)
+    return tuple(parts)
 
 
 def expect_near(corners: Floats, path: str, where: str) -> None:
@@ -204,12 +255,16 @@ def has_body(path: str, scale: Sequence[float], where: str, urdf: str) -> bool:
     Raises:
         AssetError: If it cannot be read; see `read_corners`.
     """
+    return _has_body(path, _identity(path), tuple(scale), where, urdf)
+
+
+def _identity(path: str) -> tuple[int, ...]:
+    """Return what changes with a file; nothing if there is none."""
     try:
         status = os.stat(path)
     except OSError:
-        return _has_body(path, (), tuple(scale), where, urdf)
-    identity = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
-    return _has_body(path, identity, tuple(scale), where, urdf)
+        return ()
+    return (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
 
 
 @lru_cache(maxsize=4096)

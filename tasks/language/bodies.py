@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import cos, isfinite, sin
@@ -22,9 +22,10 @@ from objects.shapes import (
 )
 from robot_layouts.core.schema import check_fields
 from robot_layouts.kinematics.quaternions import multiplied
-from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_table
+from robot_layouts.simulation import Box, Friction, Mesh, Shape, Sphere, World, add_table
 from robot_layouts.simulation.world import TABLE_OUTLINE, BodyKind
 from robots import TaskError
+from robots.assets.locator import FileLocator
 from robots.descriptor import IDENTITY, Quaternion
 from tasks.language.props import (
     FACE_UP,
@@ -515,6 +516,14 @@ def _turned(lying: Quaternion, turn: Quaternion) -> Quaternion:
 def declared_bodies(task: type) -> dict[str, Declared]:
     """Return the bodies that a task's class declares, by name, its bases' first."""
     return dict(_bodies(task))
+
+
+def files_of(bodies: Iterable[Declared]) -> Iterator[tuple[FileLocator, bool]]:
+    """Yield the files of the manifest that bodies name, and whether physics needs each."""
+    for body in bodies:
+        for shape in body.shapes if isinstance(body, Body) else ():
+            if isinstance(shape, Mesh) and isinstance(shape.file, FileLocator):
+                yield shape.file, shape.collides
 
 
 def _bodies(task: type) -> Iterator[tuple[str, Declared]]:

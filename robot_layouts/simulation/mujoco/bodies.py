@@ -24,6 +24,7 @@ from objects.shapes import (
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.world import WorldBody, part_name
+from robots import SimulationError
 from robots.urdf.mesh_files import read_corners
 
 HIDDEN = 3  # group of geoms that collide; see `DRAWN`
@@ -86,6 +87,7 @@ class BodyMaker:
             if self.drawn and shape.visible:
                 add_drawn(self.spec, body, shape, self._geom(shape), marker=marker)
             if shape.collides:
+                _expect_convex(shape, body.name.removeprefix(PREFIX))
                 own = self.friction if shape.friction is None else shape.friction
                 body.add_geom(
                     **self._geom(shape),
@@ -120,8 +122,9 @@ class BodyMaker:
                 return {"size": [shape.size / 2, shape.size / 2, 1.0]}
             case ConvexHull():
                 return {"meshname": self._add_hull(np.array(shape.corners))}
-            case Mesh(file=file) if shape.collides:
-                corners = read_corners(str(file), shape.scale, str(file), str(file))
+            case Mesh() if shape.collides:
+                file = str(shape.path)
+                corners = read_corners(file, shape.scale, file, file)
                 return {"meshname": self._add_hull(corners)}
             case _:  # a mesh that is only drawn
                 return {}
@@ -131,6 +134,19 @@ class BodyMaker:
         inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         self.spec.add_mesh(name=name, uservert=corners.ravel().tolist(), inertia=inertia)
         return name
+
+
+def _expect_convex(shape: Shape, body: str) -> None:
+    """Refuse a shape that MuJoCo would let collide as if it were convex.
+
+    Raises:
+        SimulationError: If it is a mesh that collides by its surface.
+    """
+    if isinstance(shape, Mesh) and shape.collision == "surface":
+        raise SimulationError(
+            f"body {body!r}: the mesh {shape.file} collides by its surface, and MuJoCo knows convex"
+            " shapes alone; simulator='sapien3' can build it"
+        )
 
 
 def _has_mass(shapes: tuple[Shape, ...]) -> bool:
@@ -184,7 +200,7 @@ def add_drawn(spec: Any, body: Any, shape: Shape, geom: dict[str, Any], *, marke
     if not isinstance(shape, Mesh):
         body.add_geom(**geom, **ghost, rgba=_as_screens_show(shape.color))
         return
-    for mesh in load_meshes(str(shape.file), str(shape.file)):
+    for mesh in load_meshes(str(shape.path), str(shape.path)):
         name = f"{body.name}/drawn{len(spec.meshes)}"
         spec.add_mesh(
             name=name,

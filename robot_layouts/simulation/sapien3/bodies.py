@@ -235,8 +235,10 @@ def add_collision(builder: Any, shape: Shape) -> None:
         case Capsule():
             add, sizes = builder.add_capsule_collision, _round_sizes(shape)
         case Mesh():
-            add = builder.add_convex_collision_from_file
-            sizes = {"filename": str(shape.file), "scale": list(shape.scale)}
+            hollow = shape.collision == "surface"
+            kind = "nonconvex" if hollow else "convex"
+            add = getattr(builder, f"add_{kind}_collision_from_file")
+            sizes = {"filename": str(shape.path), "scale": list(shape.scale)}
         case _:
             raise TypeError(f"no collision for {type(shape).__name__}")
     add(density=shape.density, **common, **sizes)
