@@ -35,7 +35,7 @@ from robots.mjcf.reading import files_of
 from robots.registry import CATALOGUE, RobotRegistry
 from robots.urdf.summary import UrdfReferences, read_references
 from tasks import get_task_class, list_clones
-from tasks.language.bodies import files_of
+from tasks.language.bodies import named_files
 
 LARGEST_FILE = 2**28  # bytes
 ALL_ROBOTS = "robots"  # maniskill_robots: for a URDF that uses files of several robots' folders
@@ -162,7 +162,7 @@ def build_parts(name: str, installed: Path) -> AssetPackage:
     folder = installed / (inside := TASK_FOLDERS[name])
     origin = _origin(MANI_SKILL, name, inside, "object", _licence(folder))
     bodies = [body for task in list_clones() for body in get_task_class(task).bodies.values()]
-    found = [(file.file, needed) for file, needed in files_of(bodies) if file.package == name]
+    found = [(file.file, needed) for file, needed in named_files(bodies) if file.package == name]
     physics = {path for path, needed in found if needed}
     pictures = {path for path, _ in found} - physics
     files = (

@@ -38,7 +38,8 @@ def fetch(
     Exit code: 0 if every file is there and right, 1 if not, 2 for bad usage.
 
     Args:
-        robots: Robots to fetch (default: all, and what tasks are made of, or all that --source has).
+        robots: Robots to fetch (default: all, with scenery and what tasks are made of, or as far as
+            --source has them).
         check: Fetch nothing, only list what is missing or wrong.
         offline: Never use the network.
         source: Use this source alone.

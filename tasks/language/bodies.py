@@ -518,7 +518,7 @@ def declared_bodies(task: type) -> dict[str, Declared]:
     return dict(_bodies(task))
 
 
-def files_of(bodies: Iterable[Declared]) -> Iterator[tuple[FileLocator, bool]]:
+def named_files(bodies: Iterable[Declared]) -> Iterator[tuple[FileLocator, bool]]:
     """Yield the files of the manifest that bodies name, and whether physics needs each."""
     for body in bodies:
         for shape in body.shapes if isinstance(body, Body) else ():
