@@ -20,6 +20,8 @@ from robot_layouts.core.writing import write_whole
 from robots.assets.locator import (
     APPLE,
     APPLE_BODY,
+    ASSEMBLY,
+    ASSEMBLY_FILES,
     BOWL,
     BOWL_BODY,
     CARDBOARD_BOX,
@@ -73,6 +75,7 @@ SCENES: dict[str, tuple[str, tuple[FileLocator, ...]]] = {
         "mani_skill/envs/tasks/humanoid/assets",
         (APPLE, APPLE_BODY, BOWL, BOWL_BODY, CARDBOARD_BOX, *CARDBOARD_BOX_LOOKS),
     ),
+    ASSEMBLY: ("mani_skill/envs/tasks/fmb/assets", ASSEMBLY_FILES),
     KITCHEN: ("mani_skill/utils/scene_builder/kitchen_counter/assets", (KITCHEN_COUNTER,)),
 }
 ON_HUB = (SCENERY,)  # of these
