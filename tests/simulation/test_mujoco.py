@@ -58,7 +58,15 @@ def leaves(thing, name=""):
         for key, value in thing.items():
             yield from leaves(value, f"{name}/{key}")
     else:
-        yield name, np.asarray(thing, float)
+        values = np.asarray(thing, float)
+        yield name, facing(values) if name.endswith("tip_poses") else values
+
+
+def facing(poses):
+    """Return poses, (N, 7 · links), whose quaternions have one of their two signs, w >= 0."""
+    rows = poses.reshape(len(poses), -1, 7).copy()
+    rows[..., 3:] *= np.where(rows[..., 3:4] < 0, -1.0, 1.0)
+    return rows.reshape(poses.shape)
 
 
 @pytest.mark.parametrize("task", quick_cases(tasks.list_tasks(), quick=TASKS))
