@@ -9,7 +9,7 @@ import trimesh
 from scipy.spatial import ConvexHull as QhullsHull
 
 from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Sphere
-from objects.solids import bounds, hull_triangles, lowest, mass_of, reach, sampled, surface
+from objects.solids import bounds, hull_triangles, lowest, mass_of, pieces, reach, sampled, surface
 from robot_layouts.kinematics.quaternions import normalised
 from robots import DescriptorError, SimulationError
 
@@ -82,6 +82,26 @@ def test_a_mesh_counts_as_its_convex_hull(tmp_path):
     trimesh.creation.annulus(0.1, 0.2, 0.3).export(tmp_path / "ring.stl")
     found = mass_of([Mesh(tmp_path / "ring.stl", scale=(2.0, 2.0, 2.0))])
     assert found.volume == pytest.approx(8 * math.pi * 0.2**2 * 0.3, rel=0.02)
+
+
+def test_the_pieces_of_a_mesh_are_told_apart_and_flat_ones_left_out(tmp_path):
+    ball, block = trimesh.creation.icosphere(), trimesh.creation.box((1.0, 2.0, 3.0))
+    block.apply_translation((5.0, 0.0, 0.0))
+    sheet = trimesh.Trimesh([(9, 0, 0), (9, 1, 0), (9, 0, 1)], [(0, 1, 2)])
+    trimesh.util.concatenate([ball, block, sheet]).export(tmp_path / "three.stl")
+    first, second = sorted(pieces(str(tmp_path / "three.stl"), (2.0, 1.0, 1.0)), key=len)
+    assert np.ptp(first, axis=0) == pytest.approx([2.0, 2.0, 3.0])
+    assert first.mean(0) == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
+    assert np.ptp(second, axis=0) == pytest.approx([4.0, 2.0, 2.0])
+    with pytest.raises(DescriptorError, match=r"gone.stl cannot be read as a mesh"):
+        pieces(str(tmp_path / "gone.stl"), (1.0, 1.0, 1.0))
+
+
+def test_a_mesh_whose_surface_collides_has_its_hollows(tmp_path):
+    trimesh.creation.annulus(0.1, 0.2, 0.3).export(tmp_path / "ring.stl")
+    for collision in ("pieces", "surface"):
+        ring = surface(Mesh(tmp_path / "ring.stl", collision=collision))
+        assert (np.hypot(ring.corners[:, 0], ring.corners[:, 1]) < 0.15).any()
 
 
 def test_what_never_ends_has_no_surface(tmp_path):

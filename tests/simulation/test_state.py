@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -117,3 +119,22 @@ def test_a_grasp_may_be_told_by_a_narrower_angle():
     assert state.is_grasping("arm", "l_shape_tool").all()
     assert state.is_grasping("arm", "l_shape_tool", 90.0).all()
     assert not state.is_grasping("arm", "l_shape_tool", 0.0).any()
+
+
+def test_other_links_than_a_robots_own_fingers_may_hold_a_body():
+    env = tasks.make("PullCubeTool-v1")
+    env.reset(seed=0)
+    world = env.simulation.worlds[0]
+    x, y, z = state_of(env).tcp_position("arm")[0].tolist()
+    world.set_pose("l_shape_tool", (x - 0.05, y, z))
+    for _ in range(3):
+        env.step(torch.tensor([[0.0] * 7 + [-1.0]]))
+    state, own = state_of(env), env.layout["arm"].robot.fingers
+    assert own is not None
+    outwards = replace(own, opening_signs=(-1, 1))
+    other = replace(own, links=("panda_leftfinger", "panda_hand"))
+    assert state.is_held("arm", "l_shape_tool", own).all()
+    assert not state.is_held("arm", "l_shape_tool", outwards).any()
+    assert not state.is_held("arm", "l_shape_tool", other).any()
+    with pytest.raises(UnknownNameError, match="Did you mean 'panda_leftfinger'"):
+        state.is_held("arm", "l_shape_tool", replace(own, links=("panda_leftfingr", "panda_hand")))

@@ -100,6 +100,15 @@ def test_a_name_of_numpys_means_what_it_means_there(name):
         np.testing.assert_allclose(getattr(maths, name)(rows, axis=0), theirs, 2e-6, 1e-5)
 
 
+@pytest.mark.parametrize("name", ["mean", "norm", "sum"])
+@pytest.mark.parametrize("count", [5, 33, 64])
+def test_a_batchs_rows_are_rounded_as_single_rows_are(name, count):
+    rows = np.random.default_rng(2).normal(size=(25, count)).astype(np.float32).T  # not in order
+    axis = () if name == "norm" else (1,)
+    alone = [getattr(maths, name)(row[None], *axis) for row in rows]
+    np.testing.assert_array_equal(getattr(maths, name)(rows, *axis), np.concatenate(alone))
+
+
 def test_a_name_that_is_missing():
     with pytest.raises(AttributeError, match=r"no 'absolute'. Did you mean 'abs'\? It has"):
         maths.absolute  # noqa: B018

@@ -1,15 +1,17 @@
-"""What robots stand in, where it is no table: the bare ground."""
+"""What robots stand in, where it is no table: the bare ground, a kitchen counter."""
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import tasks
 from layouts import Layout
 from objects.shapes import Floor
+from objects.solids import bounds
 from robot_layouts.simulation import Plane, World
 from robots import LayoutError, TaskError
-from tasks import Cube, Ground
+from tasks import Cube, Ground, KitchenCounter
 from tasks.randomization.distractors import area_of
 
 PICK = tasks.get_task_class("PickCube-v1")
@@ -56,6 +58,21 @@ def test_a_floor_is_drawn_with_as_many_sizes_of_its_texture_as_declared():
     _, floor = world.bodies["ground"].shapes
     assert isinstance(floor, Floor)
     assert floor.mipmaps == 7
+
+
+def test_a_kitchen_counter_is_as_large_as_declared():
+    boxes = []
+    for scale in (1.0, 0.5):
+        world = World(OnGround.layout)
+        KitchenCounter(scale).add_to(world, "table")
+        assert list(world.bodies) == ["kitchen-counter", "ground"]
+        boxes.append(np.ptp(bounds(world.bodies["kitchen-counter"].shapes), axis=0))
+    width, length, height = boxes[0]
+    assert (width, length) == pytest.approx((0.669, 3.108), abs=1e-3)
+    assert height == pytest.approx(0.979, abs=1e-3)
+    assert boxes[1] == pytest.approx(boxes[0] / 2)
+    with pytest.raises(TaskError, match="KitchenCounter: scale is 0"):
+        KitchenCounter(0)
 
 
 @pytest.mark.parametrize("sizes", [0, 2.5, "all"])
