@@ -63,7 +63,8 @@ def fetch(
     if pictures and not robots:
         needs["scenery"] = load_manifest().package(SCENERY).files
     for name in TASK_FILES if not robots else ():
-        needs[name] = load_manifest().package(name).files
+        files = load_manifest().package(name).files
+        needs[name] = tuple(file for file in files if pictures or file.physics)
     store = AssetStore(default_root() if dest is None else absolute(dest, "--dest"))
     sources = _sources(source, store, offline=offline, revision=revision)
     if source and not robots:

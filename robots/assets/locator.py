@@ -136,17 +136,14 @@ CARDBOARD_BOX_LOOKS = (
     FileLocator(HUMANOID_THINGS, "cardboard_box/box.mtl"),
     FileLocator(HUMANOID_THINGS, "cardboard_box/01.png"),
 )
-ASSEMBLY_FILES = tuple(
+_U = "blue_u", "purple_u", "green_bridge"  # parts whose looks are files of their own
+ASSEMBLY_BODIES = tuple(
     FileLocator(ASSEMBLY, file)
     for file in (
-        "blue_u.glb",
-        "blue_u.ply",
+        *(f"{part}.ply" for part in _U),
         "board_1.glb",
-        "green_bridge.glb",
-        "green_bridge.ply",
-        "purple_u.glb",
-        "purple_u.ply",
         "reorienting_fixture.glb",
         "yellow_peg.glb",
     )
 )
+ASSEMBLY_LOOKS = tuple(FileLocator(ASSEMBLY, f"{part}.glb") for part in _U)
