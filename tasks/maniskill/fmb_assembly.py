@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-import torch
 
 from layouts import single
 from robots.assets.locator import ASSEMBLY, FileLocator
@@ -99,7 +98,7 @@ class FMBAssembly1Easy(Clone):
             _set(world, name, _in_assembly(place))
         world.set_pose("reorienting_fixture", FIXTURE_PLACE)
         off = rng.uniform_between((-SPAWN_HALF_WIDTH,) * 2, (SPAWN_HALF_WIDTH,) * 2)
-        x, y = (torch.tensor(SPAWN) + off).tolist()
+        x, y = (np.array(SPAWN, np.float32) + off.numpy()).tolist()
         bridge = _row(x, y, LYING_HEIGHT, *LYING)
         _set(world, "green_bridge", bridge)
         _set(world, "bridge_grasp", compose(bridge, _row(*GRASP)))
