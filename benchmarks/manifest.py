@@ -20,6 +20,9 @@ from robot_layouts.core.writing import write_whole
 from robots.assets.locator import (
     APPLE,
     APPLE_BODY,
+    ASSEMBLY,
+    ASSEMBLY_BODIES,
+    ASSEMBLY_LOOKS,
     BOWL,
     BOWL_BODY,
     CARDBOARD_BOX,
@@ -66,14 +69,18 @@ TERMS = {
     "Zlib": "zlib licence: do not claim to be the author, and say so where you change the files",
     "MPL-2.0": "Mozilla Public License 2.0: what you change in the files stays under it",
 }
-# Packages of files that belong to no robot: their folder in mani_skill's wheel, and which they are.
-SCENES: dict[str, tuple[str, tuple[FileLocator, ...]]] = {
-    SCENERY: ("mani_skill/utils", (TABLE, GROUND_TEXTURE)),
+# Packages of files that belong to no robot: their folder in mani_skill's wheel, what physics needs,
+# and what pictures need besides.
+_Files = tuple[FileLocator, ...]
+SCENES: dict[str, tuple[str, _Files, _Files]] = {
+    SCENERY: ("mani_skill/utils", (), (TABLE, GROUND_TEXTURE)),
     HUMANOID_THINGS: (
         "mani_skill/envs/tasks/humanoid/assets",
-        (APPLE, APPLE_BODY, BOWL, BOWL_BODY, CARDBOARD_BOX, *CARDBOARD_BOX_LOOKS),
+        (APPLE_BODY, BOWL_BODY, CARDBOARD_BOX),
+        (APPLE, BOWL, *CARDBOARD_BOX_LOOKS),
     ),
-    KITCHEN: ("mani_skill/utils/scene_builder/kitchen_counter/assets", (KITCHEN_COUNTER,)),
+    ASSEMBLY: ("mani_skill/envs/tasks/fmb/assets", ASSEMBLY_BODIES, ASSEMBLY_LOOKS),
+    KITCHEN: ("mani_skill/utils/scene_builder/kitchen_counter/assets", (KITCHEN_COUNTER,), ()),
 }
 ON_HUB = (SCENERY,)  # of these
 
@@ -166,13 +173,17 @@ def build_scenery(installed: Path, name: str) -> AssetPackage:
     Raises:
         AssetError: If mani_skill lacks one of its files.
     """
-    inside, locators = SCENES[name]
+    inside, bodies, looks = SCENES[name]
     folder = installed / inside
     origin = _origin(MANI_SKILL, name, inside, "scene", _licence(folder))
     if name not in ON_HUB:
         origin = replace(origin, hub_dataset=None, hub_folder=None)
-    paths = sorted(locator.file for locator in locators)
-    return AssetPackage(origin, tuple(_asset_file(origin, folder, p, set(), set()) for p in paths))
+    physics, pictures = ({locator.file for locator in own} for own in (bodies, looks))
+    files = (
+        _asset_file(origin, folder, path, {path} & physics, {path} & pictures)
+        for path in sorted(physics | pictures)
+    )
+    return AssetPackage(origin, tuple(files))
 
 
 def build_objects(package: IndexPackage) -> AssetPackage:

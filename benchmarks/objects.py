@@ -132,8 +132,7 @@ def digest_of(thing: ObjectDescriptor) -> str:
 def _portable(parts: Sequence[Shape]) -> tuple[Shape, ...]:
     """Return shapes without the folders that mesh files are in on this machine."""
     return tuple(
-        replace(part, file=Path(part.file).name) if isinstance(part, Mesh) else part
-        for part in parts
+        replace(part, file=part.path.name) if isinstance(part, Mesh) else part for part in parts
     )
 
 

@@ -51,6 +51,7 @@ TASKS: Mapping[str, tuple[Callable[[], Layout], str]] = {
         partial(_one, "panda_stick", qpos_noise=0.0),
         "envs/tasks/drawing/draw_triangle.py: TableSceneBuilder(robot_init_qpos_noise=0)",
     ),
+    "FMBAssembly1Easy-v1": (_panda, TABLE),
     "LiftPegUpright-v1": (_panda, TABLE),
     "PegInsertionSide-v1": (_panda_wristcam, TABLE),
     "PickCube-v1": (_panda, TABLE),

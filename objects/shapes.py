@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from robot_layouts.core.bounds import FAR, checked_number, expect_unit
 from robot_layouts.core.errors import SimulationError
 from robot_layouts.core.schema import check_fields, whole, within
+from robots.assets.locator import FileLocator
 from robots.descriptor import IDENTITY, Quaternion
 from robots.urdf.mesh_files import has_volume
 
@@ -219,7 +220,7 @@ class Mesh(Shape):
     """A mesh file.
 
     Attributes:
-        file: Mesh file.
+        file: Mesh file, or where the manifest lists it: then it is fetched when it is needed.
         scale: Scale along x, y, z.
         collision: What of it collides: its convex ``"hull"``, the hulls of its ``"pieces"``, each a
             part of the mesh that hangs together, or its very ``"surface"``, in a body that physics
@@ -227,10 +228,20 @@ class Mesh(Shape):
         textured: Whether it is drawn as its file says; else in ``color``, with the file's finish.
     """
 
-    file: Path | str
+    file: FileLocator | Path | str
     scale: tuple[Factor, Factor, Factor] = (1.0, 1.0, 1.0)
     collision: MeshCollision = "hull"
     textured: bool = False
+
+    @property
+    def path(self) -> Path:
+        """Where the file is on this machine.
+
+        Raises:
+            AssetError: If the manifest lists it, and no source has it.
+            UnknownNameError: If the manifest does not list it, though it should.
+        """
+        return self.file.locate() if isinstance(self.file, FileLocator) else Path(self.file)
 
 
 @dataclass(frozen=True)

@@ -318,7 +318,7 @@ def _surface(shape: Shape) -> tuple[Floats, NDArray[np.intp]]:
             return _BOX * shape.half_size, hull_triangles(tuple(map(tuple, _BOX.tolist())))
         case Mesh():
             whole = shape.collides and shape.collision == "hull"
-            return _file(str(shape.file), shape.scale, whole)
+            return _file(str(shape.path), shape.scale, whole)
         case _:
             return _round(shape)
 

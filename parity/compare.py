@@ -34,6 +34,7 @@ from parity.results import (
     Summary,
     document,
     number_text,
+    read_results,
     record_text,
     reward_text,
     success_text,
@@ -53,8 +54,8 @@ class Wanted:
 
     Attributes:
         task: Task ids, or other names of tasks.
-        all: Every clone: random and over-range actions and --demos, fresh and reused, and reused
-            in each further reward mode.
+        all: Every clone, or all of what --task names: random and over-range actions and --demos,
+            fresh and reused, and reused in each further reward mode.
         seeds: Reset seeds 0 … N-1.
         steps: Control steps of a random episode.
         actions: Play this recording (.h5) instead.
@@ -87,8 +88,8 @@ class Wanted:
             if getattr(self, name) < 1:
                 option = name.replace("_", "-")
                 raise TaskError(f"--{option} is {getattr(self, name)}; it must be 1 or more")
-        if bool(self.task) == self.all:
-            raise TaskError("give either --task or --all")
+        if not self.task and not self.all:
+            raise TaskError("give --task, --all, or both")
         if self.actions and (self.all or len(self.task) > 1 or self.demos):
             raise TaskError("--actions holds the episodes of one task: give one --task, no --demos")
         if self.control_mode not in (None, *CONTROL_MODES):
@@ -169,7 +170,8 @@ def compare(
     Args:
         wanted: What to compare.
         json: Write the results to this file.
-        record: Keep the results of --all in the record, for the documentation.
+        record: Keep the results of --all in the record, for the documentation; with --task, beside
+            what was recorded before of the others.
 
     Raises:
         RobotLayoutsError: If it could not be compared.
@@ -199,7 +201,8 @@ def compare(
     if json:
         write_whole(json, dumps(found | {"tasks": summaries}, indent=1) + "\n")
     if record:
-        write_whole(RESULTS, record_text(found, summaries))
+        others = read_results(RESULTS)["tasks"] if wanted.task else {}
+        write_whole(RESULTS, record_text(found, summaries, others))
     return 0 if all(result.equal for result in results) else 1
 
 

@@ -112,14 +112,17 @@ def _largest(runs: list[Mapping[str, Any]], quantity: str) -> float | str:
     return max((run["max_difference"][quantity] for run in runs), key=float)
 
 
-def record_text(found: Mapping[str, Any], summaries: Mapping[str, Summary]) -> str:
+def record_text(
+    found: Mapping[str, Any], summaries: Mapping[str, Summary], others: Mapping[str, Any]
+) -> str:
     """Return the record's text; makes each task once, to count its observation.
 
     Args:
         found: `document` of the comparison.
         summaries: `summarise` of it.
+        others: What is kept of tasks that were not compared, by their ids.
     """
-    entries: dict[str, Any] = {}
+    entries = dict(others)
     for task, summary in summaries.items():
         about = facts(task)
         entries[task] = {
@@ -128,8 +131,11 @@ def record_text(found: Mapping[str, Any], summaries: Mapping[str, Summary]) -> s
             "action_size": about.action_size,
             **summary,
         }
-    shared = {key: found[key] for key in ("equal", "versions", "machine")}
-    return json.dumps({**shared, "tasks": entries}, indent=1, ensure_ascii=False) + "\n"
+    shared = {key: found[key] for key in ("versions", "machine")}
+    kept = {task: entries[task] for task in sorted(entries)}
+    equal = all(entry["equal"] for entry in kept.values())
+    record = {"equal": equal, **shared, "tasks": kept}
+    return json.dumps(record, indent=1, ensure_ascii=False) + "\n"
 
 
 def read_results(path: Path = RESULTS) -> dict[str, Any]:

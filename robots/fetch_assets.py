@@ -10,7 +10,7 @@ from robot_layouts.core.commands import UsageError, print_error, printable, star
 from robot_layouts.core.errors import RobotLayoutsError
 from robot_layouts.core.paths import absolute, default_root
 from robots.assets.fetching import default_sources, ensure
-from robots.assets.locator import SCENERY, UrdfLocator
+from robots.assets.locator import SCENERY, TASK_FILES, UrdfLocator
 from robots.assets.manifest import INDEX_PACKAGES, AssetFile, load_manifest
 from robots.assets.sources import AssetSource, HubSource, InstalledPackage, LocalCopy, PackageWheel
 from robots.assets.store import AssetStore, FileState, size
@@ -38,7 +38,8 @@ def fetch(
     Exit code: 0 if every file is there and right, 1 if not, 2 for bad usage.
 
     Args:
-        robots: Robots to fetch (default: all, or all that --source has).
+        robots: Robots to fetch (default: all, with scenery and what tasks are made of, or as far as
+            --source has them).
         check: Fetch nothing, only list what is missing or wrong.
         offline: Never use the network.
         source: Use this source alone.
@@ -61,6 +62,9 @@ def fetch(
     needs = {robot.name: robot_files(robot, pictures=pictures) for robot in chosen}
     if pictures and not robots:
         needs["scenery"] = load_manifest().package(SCENERY).files
+    for name in TASK_FILES if not robots else ():
+        files = load_manifest().package(name).files
+        needs[name] = tuple(file for file in files if pictures or file.physics)
     store = AssetStore(default_root() if dest is None else absolute(dest, "--dest"))
     sources = _sources(source, store, offline=offline, revision=revision)
     if source and not robots:

@@ -79,6 +79,7 @@ CATALOGUE = {
     "CellUnloadTurntable-v1": "tasks.cells.unload_turntable:CellUnloadTurntable",
     "CellUnlock-v1": "tasks.cells.unlock:CellUnlock",
     "DrawTriangle-v1": "tasks.maniskill.draw_triangle:DrawTriangle",
+    "FMBAssembly1Easy-v1": "tasks.maniskill.fmb_assembly:FMBAssembly1Easy",
     "FourRobotStack-v1": "tasks.originals.four_robot_stack:FourRobotStack",
     "LiftPegUpright-v1": "tasks.maniskill.lift_peg_upright:LiftPegUpright",
     "PegInsertionSide-v1": "tasks.maniskill.peg_insertion_side:PegInsertionSide",

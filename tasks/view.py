@@ -94,7 +94,7 @@ def _parts(shape: Shape) -> list[Visual]:
             plane = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]])
             meshes = [plane.apply_transform(pose)]
         case Mesh():
-            meshes = load_meshes(str(shape.file), "a body of the task")
+            meshes = load_meshes(str(shape.path), "a body of the task")
             meshes = [mesh.apply_scale(shape.scale).apply_transform(pose) for mesh in meshes]
         case _:
             meshes = [trimesh.Trimesh(*surface(shape), process=False)]

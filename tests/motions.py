@@ -257,6 +257,16 @@ def turn_valve(puppeteer: Puppeteer) -> None:
         puppeteer.play(action.astype(np.float32))
 
 
+def fmb_assembly(puppeteer: Puppeteer) -> None:
+    """Grasp the bridge, let it fall into the fixture, and strike the assembly."""
+    grasp_and_shake(puppeteer, "arm", pi / 2, approach=28, body="bridge_grasp")
+    hand = downwards(pi / 2)
+    puppeteer.move(12, CLOSED, {"arm": ((0.05, 0.25, 0.15), hand)})
+    puppeteer.move(8, OPEN, {"arm": ((0.05, 0.25, 0.12), hand)})
+    puppeteer.move(12, OPEN, {"arm": ((0.13, 0.0, 0.2), hand)})
+    puppeteer.move(10, CLOSED, {"arm": ((0.13, 0.02, 0.05), hand)})
+
+
 def touch_something(puppeteer: Puppeteer) -> None:
     """Reach for the first movable body with every robot in turn; for tasks not listed below."""
     bodies = [
@@ -277,6 +287,7 @@ def yaw_of(quaternion: Sequence[float]) -> float:
 
 # Motions made for a task; `touch_something` serves the others.
 MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
+    "FMBAssembly1Easy-v1": fmb_assembly,
     "PickCube-v1": pick_cube,
     "PickCubeSO100-v1": pick_cube_so100,
     "PokeCube-v1": poke_cube,

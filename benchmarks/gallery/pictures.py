@@ -33,7 +33,7 @@ from robots.registry import CATALOGUE as ROBOTS
 from robots.urdf.summary import parse_urdf, read_urdf
 from tasks import TaskEnv
 from tasks.engine.columns import overview
-from tasks.episode import play
+from tasks.episode import REBUILT, play
 
 Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]  # (H, W, 3)
@@ -138,18 +138,15 @@ class Artist:
     def draw(self, name: str) -> None:
         """Draw a robot's portrait, or film the first episode that a task's expert solves.
 
+        Of a task without an expert, what the first episode begins with is drawn.
+
         Raises:
-            RecordError: If the record has no such episode.
+            RecordError: If the expert solved none.
             AssetError: If robot files cannot be found.
             UnwritableFileError: If the picture cannot be written.
         """
         if name not in ROBOTS:
-            expert = self._record["tasks"][name]["expert"]
-            unsolved = set(map(int, expert["failed"]))
-            seeds = [seed for seed in range(expert["episodes"]) if seed not in unsolved]
-            if not seeds:
-                raise RecordError(f"the expert of {name} solved no episode; nothing can be shown")
-            simulation, pictures = film(name, seeds[0])
+            simulation, pictures = self._film(name)
             content, path = smallest(pictures, LARGEST_CLIP), f"media/tasks/{name}.webp"
         else:
             robot = RobotRegistry.load(name)
@@ -160,6 +157,16 @@ class Artist:
             content, path = smallest([picture], LARGEST_PORTRAIT), f"media/robots/{name}.webp"
         self._kept = self._kept or simulation
         write_whole(self._folder / path, content)
+
+    def _film(self, task_id: str) -> tuple[TaskEnv, list[Picture]]:
+        expert = self._record["tasks"][task_id]["expert"]
+        if expert is None:
+            return still(task_id)
+        unsolved = set(map(int, expert["failed"]))
+        seeds = [seed for seed in range(expert["episodes"]) if seed not in unsolved]
+        if not seeds:
+            raise RecordError(f"the expert of {task_id} solved no episode; nothing can be shown")
+        return film(task_id, seeds[0])
 
 
 def portrait(robot: RobotDescriptor) -> tuple[Simulation, Picture]:
@@ -211,23 +218,46 @@ def film(task_id: str, seed: int) -> tuple[TaskEnv, list[Picture]]:
     finally:
         planning.close()
     task = tasks.make(task_id, render_mode="rgb_array")
-    eye, target = (overview(task.layout) if len(task.layout) == 2 else None) or task.viewpoint
-    azimuth = atan2(eye[1] - target[1], eye[0] - target[0])
-    lens = Lens(azimuth, ELEVATION, FIELD_OF_VIEW, CLIP_ASPECT, CLIP_MARGIN)
-    camera = lens.camera(lens.fitted(np.concatenate(points)), CLIP_HEIGHT * CLIP_SAMPLES)
+    camera = _camera(task, np.concatenate(points))
     pictures, step = list[Picture](), 0
     stride = steps_per_frame(len(actions), task.scenario.control_frequency)
 
     def watch() -> None:
         nonlocal step
         if step % stride == 0 or step == len(actions):
-            (view,) = task.simulation.look(0, {"clip": camera}, TEXTURES[:2], markers=True)
-            rgb, solid = view.images["rgb"].astype(np.uint8), view.images["segmentation"] != 0
-            pictures.append(shrunk(rgb, solid, CLIP_SAMPLES))
+            pictures.append(_seen(task, camera))
         step += 1
 
     play(task, seed, actions, watch)
     return task, pictures
+
+
+def still(task_id: str) -> tuple[TaskEnv, list[Picture]]:
+    """Draw what the episode of seed 0 begins with.
+
+    Returns:
+        The task, and the picture, alone in a list.
+
+    Raises:
+        AssetError: If robot files cannot be found.
+    """
+    task = tasks.make(task_id, render_mode="rgb_array")
+    task.reset(seed=0, options=REBUILT)
+    return task, [_seen(task, _camera(task, _places(task)))]
+
+
+def _camera(task: TaskEnv, points: Floats) -> Camera:
+    """Return the camera that sees points, (n, 3) (m), from where people see the task."""
+    eye, target = (overview(task.layout) if len(task.layout) == 2 else None) or task.viewpoint
+    azimuth = atan2(eye[1] - target[1], eye[0] - target[0])
+    lens = Lens(azimuth, ELEVATION, FIELD_OF_VIEW, CLIP_ASPECT, CLIP_MARGIN)
+    return lens.camera(lens.fitted(points), CLIP_HEIGHT * CLIP_SAMPLES)
+
+
+def _seen(task: TaskEnv, camera: Camera) -> Picture:
+    (view,) = task.simulation.look(0, {"clip": camera}, TEXTURES[:2], markers=True)
+    rgb, solid = view.images["rgb"].astype(np.uint8), view.images["segmentation"] != 0
+    return shrunk(rgb, solid, CLIP_SAMPLES)
 
 
 def steps_per_frame(steps: int, control_frequency: float) -> int:

@@ -98,4 +98,4 @@ def _shape(plain: dict[str, Any], folder: Path) -> Shape:
         if name in given:
             given[name] = made_of(**given[name])
     shape = kind(**given)
-    return replace(shape, file=folder / shape.file) if isinstance(shape, Mesh) else shape
+    return replace(shape, file=folder / shape.path) if isinstance(shape, Mesh) else shape

@@ -61,7 +61,7 @@ def _corners(shape: Shape) -> Floats:
         case ConvexHull():
             return np.array(shape.corners)
         case Mesh():
-            return _of(mesh("a mesh", shape.file, scale=shape.scale))
+            return _of(mesh("a mesh", shape.path, scale=shape.scale))
         case Plane():
             below = (-HALF_SPACE / 2, 0.0, 0.0)
             return _of(box("a plane", [HALF_SPACE] * 3)) + below

@@ -10,9 +10,11 @@ from robot_layouts.core.paths import absolute
 
 # What stands around robots in pictures; physics needs none of it.
 SCENERY = "maniskill_tabletop"  # a package of the manifest
-# What ManiSkill's humanoids handle; likewise.
+# What bodies of ManiSkill's tasks are made of.
 HUMANOID_THINGS = "maniskill_humanoid_things"
-KITCHEN = "maniskill_kitchen_counter"  # what robots may stand at; likewise
+KITCHEN = "maniskill_kitchen_counter"
+ASSEMBLY = "maniskill_fmb"
+TASK_FILES = (ASSEMBLY, HUMANOID_THINGS, KITCHEN)
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,10 @@ class FileLocator:
 
     package: str
     file: str
+
+    def __str__(self) -> str:
+        """Return package and file."""
+        return f"{self.package}/{self.file}"
 
     def locate(self) -> Path:
         """Return the path of the file, fetched and checked.
@@ -130,3 +136,14 @@ CARDBOARD_BOX_LOOKS = (
     FileLocator(HUMANOID_THINGS, "cardboard_box/box.mtl"),
     FileLocator(HUMANOID_THINGS, "cardboard_box/01.png"),
 )
+_U = "blue_u", "purple_u", "green_bridge"  # parts whose looks are files of their own
+ASSEMBLY_BODIES = tuple(
+    FileLocator(ASSEMBLY, file)
+    for file in (
+        *(f"{part}.ply" for part in _U),
+        "board_1.glb",
+        "reorienting_fixture.glb",
+        "yellow_peg.glb",
+    )
+)
+ASSEMBLY_LOOKS = tuple(FileLocator(ASSEMBLY, f"{part}.glb") for part in _U)

@@ -100,8 +100,7 @@ class Task:
         max_episode_steps: Control steps until an episode is truncated.
         reward_modes: Reward modes, the default first.
         max_reward: What ``normalized_dense`` divides the dense reward by.
-        double_rewards: Whether dense rewards are float64, as in some of ManiSkill's tasks. Vectors
-            of environments give float32 all the same.
+        double_rewards: Whether dense rewards are float64, as in some of ManiSkill's tasks.
         first_seed: Environment i starts with seed ``first_seed + i`` when it is made.
         rebuilds: Whether every reset builds the worlds anew, with a new `design`.
         viewpoint: Camera position and target of `render` (m, world).

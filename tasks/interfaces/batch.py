@@ -78,7 +78,7 @@ class Batch:
         """Return which arrays a vector needs."""
         shapes: dict[str, tuple[tuple[int, ...], str]] = {
             "action": (self._task.single_action_space.shape, "float32"),
-            "reward": ((), "float32"),
+            "reward": ((), "float64" if self._task.double_rewards else "float32"),
             "terminated": ((), "bool"),
             "truncated": ((), "bool"),
         }

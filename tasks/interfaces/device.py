@@ -345,7 +345,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             return torch.zeros(self.num_envs, device=self.device)
         reward: Any = self.task.dense_reward(state, action, info)
         share = self.task.max_reward if self._reward_mode == "normalized_dense" else 1.0
-        return reward.float() / share
+        return (reward.double() if self.task.double_rewards else reward.float()) / share
 
     # -- checks ------------------------------------------------------------------------------
 

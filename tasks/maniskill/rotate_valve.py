@@ -309,7 +309,9 @@ class RotateValveLevel4(RotateValveLevel3):
     It has three to five spokes, at least 30° apart, about 6 cm long and 4 cm thick, give or take a
     tenth, which are drawn when worlds are built, not at every reset. The valve stands within 2 cm
     of the middle and is turned by any angle; which way it is to be turned is drawn and observed.
-    Success: its joint has turned by more than 360° that way since the episode began.
+    Success: its joint has turned by more than 360° that way since the episode began. As in native,
+    its position stays within 360° of zero, so that only those episodes can be solved in which the
+    way leads through zero.
     """
 
     max_episode_steps = 300

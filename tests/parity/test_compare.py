@@ -120,7 +120,7 @@ def test_only_an_exact_zero_is_zero():
         ),
         (["--task", "PickCube-v1", "--demos", "nowhere"], "there is no folder nowhere"),
         (["--all", "--actions", "a.h5"], "give one --task"),
-        ([], "give either --task or --all"),
+        ([], "give --task, --all, or both"),
         (["--task", "PushT-v1", "--record"], "--record keeps all of --all"),
     ],
 )
@@ -198,6 +198,12 @@ class TestComparing:
         assert entry["reward"]["dense"] == pytest.approx(float(wrong))
         assert entry["reward"]["sparse"] == 0
         assert sum("PushT-v1" in line for line in markdown(found)) == 1
+        one_more = "--task", "PullCube-v1", "--all", "--seeds", 1, "--steps", 2, "--record"
+        assert run(*one_more) == 0
+        both = read_results(record)
+        assert [*both["tasks"]] == ["PullCube-v1", "PushT-v1"]
+        assert both["tasks"]["PushT-v1"] == entry
+        assert both["equal"] != wrong
 
     def test_without_a_vulkan_driver(self):
         nowhere = {"VK_DRIVER_FILES": "/nowhere.json", "VK_ICD_FILENAMES": "/nowhere.json"}

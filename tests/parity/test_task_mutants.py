@@ -32,6 +32,10 @@ def widen_the_hole(monkeypatch: pytest.MonkeyPatch) -> None:
     )  # m, instead of 0.003
 
 
+def move_where_tips_should_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tasks.maniskill.rotate_valve.TIP_OFFSET", 0.011)  # m, instead of 0.01
+
+
 def nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave everything as it is."""
 
@@ -40,6 +44,7 @@ def nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 OTHER_MUTANTS = {
     "DrawTriangle-v1": (nothing, {"physics": PhysicsSettings()}),  # its own solver is 4/0
     "PegInsertionSide-v1": (widen_the_hole, {}),
+    **{f"RotateValveLevel{n}-v1": (move_where_tips_should_be, {}) for n in range(5)},
 }
 
 

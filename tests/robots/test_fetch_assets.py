@@ -68,7 +68,9 @@ def test_offline_fetches_from_the_installed_package_alone(store, physics):
 @pytest.mark.long
 def test_all_robots_with_pictures_and_scenery_is_the_default(store, capsys):
     assert main(["--source", "mani_skill"]) == 0
-    assert "scenery: complete, 2 files" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "scenery: complete, 2 files" in printed
+    assert "maniskill_fmb: complete, 9 files" in printed
     assert store.unusable(load_manifest().package("maniskill_tabletop").files) == []
     for name in filterfalse(is_optional, RobotRegistry.names()):  # those have another source
         urdf = RobotRegistry.load(name).urdf
@@ -80,7 +82,9 @@ def test_physics_only_leaves_the_pictures_out(store, capsys):
     assert main(["panda_wristcam", "--source", "mani_skill", "--physics-only"]) == 0
     assert not list(store.root.rglob("*.glb"))
     assert main(["--check", "--physics-only"]) == 1
-    assert "scenery" not in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "scenery" not in printed
+    assert "maniskill_fmb: 6 of 6 files" in printed
     assert main(["panda_wristcam", "--check"]) == 1
     assert "d415.stl (21.3 MB, pictures)" in capsys.readouterr().out
 

@@ -126,6 +126,13 @@ def test_the_files_of_the_scenery_come_together(store, fill):
     assert not any(file.physics for file in files)
 
 
+def test_what_tasks_are_made_of_comes_together(store, fill):
+    fill(store, load_manifest().package("maniskill_fmb").files)
+    locator = FileLocator("maniskill_fmb", "purple_u.ply")
+    assert str(locator) == "maniskill_fmb/purple_u.ply"
+    assert locator.locate() == store.root / str(locator)
+
+
 def test_a_file_that_is_not_in_the_manifest_is_named():
     with pytest.raises(UnknownNameError, match=f"unknown file of {SCENERY} 'table.glb'"):
         FileLocator(SCENERY, "table.glb").locate()

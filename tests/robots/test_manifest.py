@@ -70,6 +70,7 @@ def test_every_package_says_its_origin_and_licence():
         assert package.origin.wheel == WHEELS[prefix]
     for name in (
         "maniskill_fetch",
+        "maniskill_fmb",
         "maniskill_panda",
         "maniskill_tabletop",
         "maniskill_xarm7",

@@ -58,7 +58,21 @@ def leaves(thing, name=""):
         for key, value in thing.items():
             yield from leaves(value, f"{name}/{key}")
     else:
-        yield name, np.asarray(thing, float)
+        values = np.asarray(thing, float).copy()
+        if name.endswith("tip_poses"):
+            settle_signs(values.reshape(len(values), -1, 7)[..., 3:])
+        elif name.startswith("/state/articulations/"):
+            settle_signs(values[:, 3:7])
+        yield name, values
+
+
+def settle_signs(quaternions):
+    """Give quaternions, (…, 4), that of their two signs with which the largest number is above 0.
+
+    Those of links have any of the two in each simulator.
+    """
+    largest = np.abs(quaternions).argmax(-1, keepdims=True)
+    quaternions *= np.sign(np.take_along_axis(quaternions, largest, -1))
 
 
 @pytest.mark.parametrize("task", quick_cases(tasks.list_tasks(), quick=TASKS))

@@ -23,7 +23,11 @@ APART = 1e-4  # rad, m: how far float32 may be from MuJoCo's float64
 # At 1, drives of Pandas are at their limit of force to the last bit, on either side of it.
 SHORT = np.float32(0.99)
 OBSERVED = 2e-3  # of observations, which have speeds in them (rad/s)
-REFUSED = {"DrawTriangle-v1": "one by one", "PegInsertionSide-v1": "geometry changes"}
+REFUSED = {
+    "DrawTriangle-v1": "one by one",
+    "PegInsertionSide-v1": "geometry changes",
+    **{f"RotateValveLevel{level}-v1": "geometry changes" for level in range(5)},
+}
 
 
 def made(mode="NEXT_STEP", num_envs=3, task=TASK, **fields):

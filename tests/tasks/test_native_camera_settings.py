@@ -25,7 +25,11 @@ pytestmark = [*NATIVE, pytest.mark.usefixtures("renderer")]
 SEED = 7
 EVERYTHING = "rgb+depth+segmentation+position"
 # Pictures for people are 512 × 512 here and taken from a fixed place, by decision.
-OTHER_PICTURES = {"DrawTriangle-v1": "1280 × 960", "PlugCharger-v1": "rides on the receptacle"}
+OTHER_PICTURES = {
+    "DrawTriangle-v1": "1280 × 960",
+    "FMBAssembly1Easy-v1": "1024 × 1024",
+    "PlugCharger-v1": "rides on the receptacle",
+}
 HALF = math.sqrt(0.5)
 ROLLED = [0.5, 0.3, 0.6, 0.16, 0.386, -0.134, -0.899]  # looks at the cube, and is rolled
 INTRINSIC = np.array([[100.0, 0.0, 60.0], [0.0, 110.0, 50.0], [0.0, 0.0, 1.0]])

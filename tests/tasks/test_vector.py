@@ -26,10 +26,14 @@ def make(task_id="PushCube-v1", num_envs=NUM_ENVS, num_workers=0, **fields):
 
 
 def play(env, mode, steps, seed=7):
-    """Everything that a vector says while episodes end at different times."""
+    """Everything that a vector says while episodes end at different times.
+
+    Worlds are built with the seeds first: what was drawn of them when they were made depends on
+    which environment of how many each was.
+    """
     rng = np.random.default_rng(seed)
     width = env.single_action_space.shape
-    said = [env.reset(seed=seed)]
+    said = [env.reset(seed=seed, options={"reconfigure": True})]
     for step in range(steps):
         if step == 9:
             said.append(env.reset(seed=50, options={"reset_mask": LATER.copy()}))

@@ -139,8 +139,9 @@ class BodyMaker:
                 return {"meshname": self._add_hull(corners)}
             case ConvexHull():
                 return {"meshname": self._add_hull(np.array(shape.corners))}
-            case Mesh(file=file) if shape.collides:
-                corners = read_corners(str(file), shape.scale, str(file), str(file))
+            case Mesh() if shape.collides:
+                file = str(shape.path)
+                corners = read_corners(file, shape.scale, file, file)
                 return {"meshname": self._add_hull(corners)}
             case _:  # a mesh that is only drawn
                 return {}
@@ -160,7 +161,7 @@ def _solids(shape: Shape) -> Iterator[Shape]:
     if not isinstance(shape, Mesh) or shape.collision == "hull":
         yield shape
         return
-    for corners in pieces(str(shape.file), shape.scale):
+    for corners in pieces(str(shape.path), shape.scale):
         yield _Piece(
             position=shape.position,
             quaternion=shape.quaternion,
@@ -221,7 +222,7 @@ def add_drawn(spec: Any, body: Any, shape: Shape, geom: dict[str, Any], *, marke
     if not isinstance(shape, Mesh):
         body.add_geom(**geom, **ghost, rgba=_as_screens_show(shape.color))
         return
-    for mesh in load_meshes(str(shape.file), str(shape.file)):
+    for mesh in load_meshes(str(shape.path), str(shape.path)):
         name = f"{body.name}/drawn{len(spec.meshes)}"
         spec.add_mesh(
             name=name,

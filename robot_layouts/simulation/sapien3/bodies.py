@@ -249,7 +249,7 @@ def add_collision(builder: Any, shape: Shape) -> None:
             add, sizes = builder.add_capsule_collision, _round_sizes(shape)
         case Mesh():
             add = getattr(builder, _MESHES[shape.collision])
-            sizes = {"filename": str(shape.file), "scale": list(shape.scale)}
+            sizes = {"filename": str(shape.path), "scale": list(shape.scale)}
         case _:
             raise TypeError(f"no collision for {type(shape).__name__}")
     patch = {"patch_radius": shape.patch_radius, "min_patch_radius": shape.min_patch_radius}

@@ -108,7 +108,7 @@ def _material(shape: Shape) -> RenderMaterial:
 
 def _mesh(shape: Mesh) -> RenderShapeTriangleMesh:
     """A mesh as its file paints it, or in one colour with the finish that its file says."""
-    mesh = RenderShapeTriangleMesh(str(shape.file), list(shape.scale), None)
+    mesh = RenderShapeTriangleMesh(str(shape.path), list(shape.scale), None)
     if not shape.textured:
         for part in mesh.parts:
             part.material.set_base_color(list(shape.color))
