@@ -198,9 +198,12 @@ def _tried(thing: ObjectDescriptor) -> Record:
 
 
 def _travel(joint: Joint) -> str:
+    if joint.is_endless:
+        return "turns without end"
+    lower, upper = joint.limits
     if joint.kind == "slide":
-        return f"slides {100 * (joint.upper - joint.lower):.3g} cm"
-    return f"turns {degrees(joint.upper - joint.lower):.0f}°"
+        return f"slides {100 * (upper - lower):.3g} cm"
+    return f"turns {degrees(upper - lower):.0f}°"
 
 
 def _link(name: str) -> str:

@@ -147,6 +147,9 @@ SIMULATORS = {
 }
 """Where each simulator's backend is, by the name that ``simulator=`` takes."""
 
+EXPORT = "robot_layouts.simulation.mujoco.export:write_world"
+"""What writes a world of any simulator as a model for MuJoCo."""
+
 ON_DEVICES = "mujoco_warp"
 """The simulator of whole vectors on a device, which is no `Backend`: `tasks.interfaces.device`."""
 

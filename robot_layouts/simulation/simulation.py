@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
-from robot_layouts.simulation.backend import Backend, Rows, open_backend
+from objects import ObjectDescriptor
+from robot_layouts.core.importing import resolve_name
+from robot_layouts.simulation.backend import EXPORT, Backend, Rows, open_backend
 from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.control.modes import ModeController
@@ -240,6 +244,18 @@ class Simulation:
         if self._placements:
             self._change()
         return self.backend.look(env, cameras, textures, markers=markers)
+
+    def to_mjcf(
+        self, state: State, path: str | PathLike[str], things: Iterable[ObjectDescriptor] = ()
+    ) -> Path:
+        """Write the first world as one MJCF model, in a state; see `tasks.TaskEnv.to_mjcf`.
+
+        Args:
+            state: The state.
+            path: Where to write it; must end in ``.xml``.
+            things: Whose licences are named beside those of robots.
+        """
+        return resolve_name(EXPORT)(self, state, path, things)
 
     def describe_graphics(self) -> dict[str, str]:
         """Return on what pictures are drawn; see `Backend.describe_graphics`."""

@@ -422,10 +422,8 @@ class TaskEnv(Remade):
             SimulationError: If MuJoCo cannot do what the task's physics settings ask for.
             MissingPackageError: If mujoco is not installed.
         """
-        from robot_layouts.simulation.mujoco.export import write_world
-
         things = [own.descriptor for own in self.task.bodies.values() if isinstance(own, Object)]
-        return write_world(self.simulation, self._state, path, things)
+        return self.simulation.to_mjcf(self._state, path, things)
 
     def begin_tape(self) -> StateTape:
         """Return a tape of states for the present episode; see `write_tape`."""
