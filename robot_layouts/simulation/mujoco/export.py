@@ -41,11 +41,8 @@ def write_world(
     spec.meshdir = folder.name
     with replaced_folder(folder, _is_own, "save the model under another name") as made:
         note = licence_note((source.robot for source in models.cell.sources), things)
-        (made / LICENCES).write_text(note, encoding="utf-8")
-        for name, mesh in models.meshes.items():
-            file = made / name
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(mesh)
+        for name, content in {LICENCES: note, **models.meshes}.items():
+            write_whole(made / name, content)
         write_whole(target, spec.to_xml())
     return target
 
