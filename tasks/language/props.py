@@ -172,7 +172,7 @@ def add_kitchen_counter(world: World, scale: float = 1.0) -> None:
     """
     # mani_skill 3.0.1, utils/scene_builder/kitchen_counter/scene_builder.py
     counter = Mesh(
-        file=KITCHEN_COUNTER.locate(),
+        file=KITCHEN_COUNTER,
         scale=(scale, scale, scale),
         quaternion=COUNTER_TURN,
         collision="surface",

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import cos, pi, sin
 
 from layouts import Layout, Placement
+from objects.shapes import MeshCollision
 from robots import Fingers
 from robots.assets.locator import APPLE, APPLE_BODY, BOWL, BOWL_BODY, FileLocator
 from tasks import (
     Camera,
+    Compound,
     EpisodeRandom,
     Info,
     KitchenCounter,
     Mesh,
     Needs,
     PhysicsSettings,
-    Shape,
     State,
     World,
     register_task,
@@ -48,6 +48,15 @@ FINGER_JOINTS = tuple(
 )
 
 
+def _mesh(
+    body: FileLocator, looks: FileLocator, scale: float, collision: MeshCollision
+) -> tuple[Mesh, Mesh]:
+    """Return what collides, and what is seen."""
+    sizes = (scale, scale, scale)
+    solid = Mesh(body, sizes, collision, quaternion=UPRIGHT, visible=False)
+    return solid, Mesh(looks, sizes, quaternion=UPRIGHT, textured=True, collides=False)
+
+
 @register_task("UnitreeG1PlaceAppleInBowl-v1", "maniskill.unitree_g1_place_apple_in_bowl_native")
 class UnitreeG1PlaceAppleInBowl(Clone):
     """Take an apple from a kitchen counter with the right hand and drop it into a bowl beside it.
@@ -72,12 +81,8 @@ class UnitreeG1PlaceAppleInBowl(Clone):
     )
     sensed = ("is_grasped", "tcp_pose")
 
-    def build(self, world: World) -> None:
-        """Add the counter, the bowl, which stays where it stands, and the apple."""
-        super().build(world)
-        bowl = _thing(world, BOWL_BODY, BOWL, SCALE, surface=True)
-        world.add("bowl", *bowl, kind="kinematic", position=BOWL_START)
-        world.add("apple", *_thing(world, APPLE_BODY, APPLE, APPLE_SCALE), position=APPLE_START)
+    bowl = Compound(_mesh(BOWL_BODY, BOWL, SCALE, "surface"), kind="kinematic", start=BOWL_START)
+    apple = Compound(_mesh(APPLE_BODY, APPLE, APPLE_SCALE, "pieces"), start=APPLE_START)
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Lay the apple on the counter, and stand the bowl to its right."""
@@ -127,19 +132,3 @@ class UnitreeG1PlaceAppleInBowl(Clone):
         """Positions of the right hand's joints but for the thumb's turn, (N, 6) (rad)."""
         joints = self.layout["robot"].robot.joints
         return state.qpos("robot")[:, [joints.index(joint) for joint in FINGER_JOINTS]]
-
-
-def _thing(
-    world: World, body: FileLocator, looks: FileLocator, scale: float, *, surface: bool = False
-) -> tuple[Shape, ...]:
-    """Return what collides, and, where things are drawn, what it looks like."""
-    solid = Mesh(
-        file=body.locate(),
-        scale=(scale, scale, scale),
-        quaternion=UPRIGHT,
-        collision="surface" if surface else "pieces",
-        visible=False,
-    )
-    if not world.visuals:
-        return (replace(solid, visible=True),)
-    return solid, replace(solid, file=looks.locate(), textured=True, collides=False, visible=True)

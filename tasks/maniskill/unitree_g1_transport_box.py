@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import cos, pi, sin
 
 from layouts import Layout, Placement
@@ -10,13 +9,13 @@ from robots.assets.locator import CARDBOARD_BOX, TABLE, FileLocator
 from tasks import (
     Box,
     Camera,
+    Compound,
     EpisodeRandom,
     Ground,
     Info,
     Mesh,
     Needs,
     PhysicsSettings,
-    Shape,
     State,
     World,
     register_task,
@@ -47,6 +46,12 @@ FACING = (-1.7, -1.4)  # of the torso, turned to the box
 QUARTER_TURN = (cos(pi / 4), 0.0, 0.0, sin(pi / 4))
 
 
+def _seen(file: FileLocator, scale: float) -> Mesh:
+    """Return what a body looks like."""
+    sizes = (scale, scale, scale)
+    return Mesh(file, sizes, quaternion=QUARTER_TURN, textured=True, collides=False)
+
+
 @register_task("UnitreeG1TransportBox-v1", "maniskill.unitree_g1_transport_box_native")
 class UnitreeG1TransportBox(Clone):
     """Take a box from the table on the right in both hands, turn, and put it on the left one.
@@ -75,20 +80,22 @@ class UnitreeG1TransportBox(Clone):
     viewpoint = ((1.0, 0.0, 1.6), (0.0, 0.0, 0.65))
     cameras = (Camera((1.0, 0.0, 1.6), (0.0, 0.0, 0.65), fov=pi / 3),)
 
+    box = Compound(
+        (
+            Box(half_size=BOX_HALF_SIZE, density=BOX_DENSITY, visible=False),
+            _seen(CARDBOARD_BOX, BOX_SCALE),
+        ),
+        start=BOX_START,
+    )
+
     def build(self, world: World) -> None:
-        """Add the ground, both tables and the box."""
-        super().build(world)
+        """Add the ground, both tables, under native's names, and the box."""
+        self.table.add_to(world, "table")
+        top = Box(half_size=TABLE_HALF_SIZE, position=(0.0, 0.0, TABLE_HALF_SIZE[2]), visible=False)
         for name, y in (("table-1", TABLE_Y), ("table-2", -TABLE_Y)):
-            height = TABLE_HALF_SIZE[2]
-            block = Box(half_size=TABLE_HALF_SIZE, position=(0.0, 0.0, height))
-            world.add(
-                name,
-                *_drawn(world, block, TABLE, TABLE_SCALE),
-                kind="static",
-                position=(0.0, y, 0.0),
-            )
-        block = Box(half_size=BOX_HALF_SIZE, density=BOX_DENSITY)
-        world.add("box", *_drawn(world, block, CARDBOARD_BOX, BOX_SCALE), position=BOX_START)
+            seen = _seen(TABLE, TABLE_SCALE)
+            world.add(name, top, seen, kind="static", position=(0.0, y, 0.0))
+        self.box.add_to(world, "box")
 
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Stand the box on the right table."""
@@ -166,17 +173,3 @@ def _between(values: Floats, bounds: tuple[float, float]) -> Flags:
 def _share(distance: Floats, whole: float) -> Floats:
     """Return what is to become nothing, (N,), as a reward of ``1 / whole`` at most."""
     return (1.0 - tanh(abs(distance))) / whole
-
-
-def _drawn(world: World, block: Box, file: FileLocator, scale: float) -> tuple[Shape, ...]:
-    """Return what collides and, in its place where things are drawn, what it looks like."""
-    if not world.visuals:
-        return (block,)
-    mesh = Mesh(
-        file=file.locate(),
-        scale=(scale, scale, scale),
-        quaternion=QUARTER_TURN,
-        textured=True,
-        collides=False,
-    )
-    return replace(block, visible=False), mesh
