@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
+from pkgutil import resolve_name
 from time import perf_counter
 
 import numpy as np
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from objects import ObjectDescriptor
-from robot_layouts.core.importing import resolve_name
 from robot_layouts.simulation.backend import EXPORT, Backend, Rows, open_backend
 from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.control.joint_positions import JointPositionController

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import cos, isfinite, sin
@@ -22,9 +22,19 @@ from objects.shapes import (
 )
 from robot_layouts.core.schema import check_fields, whole
 from robot_layouts.kinematics.quaternions import multiplied
-from robot_layouts.simulation import Box, Friction, Shape, Sphere, World, add_ground, add_table
+from robot_layouts.simulation import (
+    Box,
+    Friction,
+    Mesh,
+    Shape,
+    Sphere,
+    World,
+    add_ground,
+    add_table,
+)
 from robot_layouts.simulation.world import TABLE_OUTLINE, BodyKind
 from robots import TaskError
+from robots.assets.locator import KITCHEN, FileLocator
 from robots.descriptor import IDENTITY, Quaternion
 from tasks.language.props import (
     FACE_UP,
@@ -572,6 +582,17 @@ def _turned(lying: Quaternion, turn: Quaternion) -> Quaternion:
 def declared_bodies(task: type) -> dict[str, Declared]:
     """Return the bodies that a task's class declares, by name, its bases' first."""
     return dict(_bodies(task))
+
+
+def packages_of(bodies: Iterable[Declared]) -> set[str]:
+    """Return the packages of the manifest whose files bodies are made of."""
+    named = [shape.file for body in bodies for shape in _shapes(body) if isinstance(shape, Mesh)]
+    packages = {file.package for file in named if isinstance(file, FileLocator)}
+    return packages | {KITCHEN for body in bodies if isinstance(body, KitchenCounter)}
+
+
+def _shapes(body: Declared) -> tuple[Shape, ...]:
+    return body.shapes if isinstance(body, Body) else ()
 
 
 def _bodies(task: type) -> Iterator[tuple[str, Declared]]:

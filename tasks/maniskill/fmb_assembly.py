@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numpy as np
-
 from layouts import single
 from robots.assets.locator import ASSEMBLY, FileLocator
 from tasks import (
@@ -17,13 +15,13 @@ from tasks import (
     State,
     Vector3,
     World,
-    compose,
     register_task,
 )
 from tasks.maniskill.clone import Clone
-from tasks.maths import Array, Floats, norm
+from tasks.maths import Array, norm, rounded
 
 # mani_skill 3.0.1, envs/tasks/fmb/fmb.py (m)
+
 PLACES: dict[str, Vector3] = {  # of the parts that are in place
     "board": (0.115, 0.115, 0.034444),
     "yellow_peg": (0.115, 0.115, 0.0585),
@@ -32,11 +30,11 @@ PLACES: dict[str, Vector3] = {  # of the parts that are in place
 }
 BRIDGE_PLACE = (0.115, 0.115, 0.048667)  # where the bridge belongs
 HALF_ROOT = sqrt(0.5)
-OFFSET = (0.02, -0.115, 0.0, HALF_ROOT, 0.0, 0.0, HALF_ROOT)  # from all of these, as a pose
+OFFSET, QUARTER_TURN = (0.02, -0.115, 0.0), (HALF_ROOT, 0.0, 0.0, HALF_ROOT)  # from all of these
 FIXTURE_PLACE = (0.05, 0.25, 0.0285)
 SPAWN, SPAWN_HALF_WIDTH = (-0.13, 0.23), 0.025  # of the bridge: x and y around there
 LYING_HEIGHT, LYING = 0.048667 / 2, (0.5, 0.5, -0.5, 0.5)
-GRASP = (0.0, 0.0, 0.03, 1.0, 0.0, 0.0, 0.0)  # in the bridge's frame
+GRASP_Y = -0.03  # from the bridge as it lies; along its own z axis
 PLACED_DISTANCE = 0.005
 
 # The files' y axes point up.
@@ -95,13 +93,12 @@ class FMBAssembly1Easy(Clone):
     def sample(self, world: World, rng: EpisodeRandom) -> None:
         """Put all in place but the bridge, which lies somewhere beside the fixture."""
         for name, place in PLACES.items():
-            _set(world, name, _in_assembly(place))
+            world.set_pose(name, _in_assembly(place), QUARTER_TURN)
         world.set_pose("reorienting_fixture", FIXTURE_PLACE)
         off = rng.uniform_between((-SPAWN_HALF_WIDTH,) * 2, (SPAWN_HALF_WIDTH,) * 2)
-        x, y = (np.array(SPAWN, np.float32) + off.numpy()).tolist()
-        bridge = _row(x, y, LYING_HEIGHT, *LYING)
-        _set(world, "green_bridge", bridge)
-        _set(world, "bridge_grasp", compose(bridge, _row(*GRASP)))
+        x, y = (_sum(middle, away) for middle, away in zip(SPAWN, off.tolist(), strict=True))
+        world.set_pose("green_bridge", (x, y, LYING_HEIGHT), LYING)
+        world.set_pose("bridge_grasp", (x, _sum(y, GRASP_Y), LYING_HEIGHT), LYING)
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: the bridge is where it belongs."""
@@ -109,17 +106,15 @@ class FMBAssembly1Easy(Clone):
         return {"success": norm(off) < PLACED_DISTANCE}
 
 
-def _in_assembly(place: Vector3) -> Floats:
-    """Return the pose of a part in its place, (1, 7), as native rounds it."""
-    return compose(_row(*place, 1.0, 0.0, 0.0, 0.0), _row(*OFFSET))
+def _in_assembly(place: Vector3) -> Vector3:
+    """Return where a part in its place is (m)."""
+    x, y, z = map(_sum, place, OFFSET)
+    return x, y, z
 
 
-def _row(*pose: float) -> Floats:
-    return np.array([pose], np.float32)
+def _sum(one: float, other: float) -> float:
+    """Return a sum as native's single precision rounds it."""
+    return rounded(rounded(one) + rounded(other))
 
 
-def _set(world: World, name: str, pose: Floats) -> None:
-    world.set_pose(name, pose[0, :3], pose[0, 3:])
-
-
-_BRIDGE_GOAL = (tuple(_in_assembly(BRIDGE_PLACE)[0, :3].tolist()),)
+_BRIDGE_GOAL = (_in_assembly(BRIDGE_PLACE),)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from robot_layouts.__main__ import main
-from robot_layouts.data.export.described import Described, describe, licence_for
+from robot_layouts.data.export.described import Described, describe, licence_for, parts_of
 from robot_layouts.data.reading import hub as hub_reading
 from robot_layouts.data.reading.hub import HubError, local_place
 from robot_layouts.data.reading.recording import Recording
@@ -229,6 +229,15 @@ def described(pictures: tuple[str, ...], robot: str = "panda", task: str = TASK)
     return Described(
         "LeRobot", {}, task_id=task, layout=layout, pictures=pictures, version="v3.0", **about
     )
+
+
+def test_pictures_of_what_a_task_is_made_of_name_its_licence():
+    about = described(("image",), task="FMBAssembly1Easy-v1")
+    names = {part.name: part.licence for part in parts_of(about)}
+    assert names["bodies of FMBAssembly1Easy-v1"] == "CC BY-NC 4.0"
+    assert "bodies of FMBAssembly1Easy-v1" not in {
+        part.name for part in parts_of(described((), task="FMBAssembly1Easy-v1"))
+    }
 
 
 def test_numbers_may_be_shared_as_one_likes_and_pictures_of_meshes_as_those_may():

@@ -31,7 +31,8 @@ from robots import RobotRegistry, UnknownNameError, UnreadableFileError
 from robots.assets.locator import SCENERY
 from robots.assets.manifest import load_manifest
 from robots.control_modes import written_mode
-from tasks import list_tasks
+from tasks import get_task_class, list_tasks
+from tasks.language.bodies import packages_of
 
 LEROBOT, ROBOMIMIC = "meta/info.json", ("low_dim.hdf5", "image.hdf5")
 ORIGIN = "meta/recording.json"  # of a LeRobot export
@@ -199,10 +200,21 @@ def parts_of(data: Described) -> list[UsedFiles]:
     if data.task_id not in list_tasks():
         found.append(UsedFiles(f"things of the task {data.task_id}"))
     if data.pictures:
-        origin = load_manifest().package(SCENERY).origin
-        words = f"{origin.licence} ({origin.licence_note})"
-        found.append(UsedFiles("table and floor", origin.licence, words))
+        found.append(_of_package("table and floor", SCENERY))
+        found += [_of_package(f"bodies of {data.task_id}", name) for name in _packages(data)]
     return found
+
+
+def _packages(data: Described) -> list[str]:
+    """Return the packages of the manifest that bodies of a data set's task are made of."""
+    if data.task_id not in list_tasks():
+        return []
+    return sorted(packages_of(get_task_class(data.task_id).bodies.values()))
+
+
+def _of_package(what: str, package: str) -> UsedFiles:
+    origin = load_manifest().package(package).origin
+    return UsedFiles(what, origin.licence, f"{origin.licence} ({origin.licence_note})")
 
 
 def licence_for(data: Described, wanted: str | None) -> str | None:
