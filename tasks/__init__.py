@@ -89,7 +89,7 @@ __all__ = [  # those of `tasks.vocabulary` as well, which is loaded when one of 
     "Quaternion",
     "Randomization",
     "Scenario",
-    "Scene",
+    "Surroundings",
     "Shape",
     "Shift",
     "Sphere",

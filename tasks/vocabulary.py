@@ -41,7 +41,7 @@ from tasks.language.bodies import (
     KitchenCounter,
     Object,
     Peg,
-    Scene,
+    Surroundings,
     Table,
     Target,
     WideTable,

@@ -72,7 +72,7 @@ class BaseSurface:
 
 
 @dataclass(frozen=True)
-class Ground:
+class Surfaces:
     """All surfaces, and the frames that they belong to.
 
     Attributes:
@@ -136,7 +136,7 @@ def ground_of(
     heights: float | Mapping[str, float],
     robots: Mapping[str, RobotDescriptor],
     targets: Sequence[Sequence[float]],
-) -> Ground:
+) -> Surfaces:
     """Return where bases may stand; see `layouts.search`.
 
     Raises:
@@ -146,12 +146,12 @@ def ground_of(
     bounds = None if within is None else rectangle("within", within)
     high = _heights(heights, robots)
     if around is None:
-        return Ground((_on_the_ground(bounds, targets, reach, len(robots)),), {}, high)
+        return Surfaces((_on_the_ground(bounds, targets, reach, len(robots)),), {}, high)
     if isinstance(around, Frame):
         around = {"mount": around}
     if isinstance(around, Mapping):
         surfaces = tuple(_on_frames(around, bounds, targets, reach))
-        return Ground(surfaces, dict(around), high)
+        return Surfaces(surfaces, dict(around), high)
     if not hasattr(around, "__len__") or isinstance(around, str) or len(around) != 4:
         raise _no_ground(around)
     x_min, y_min, x_max, y_max = rectangle("around", around)
@@ -161,7 +161,7 @@ def ground_of(
     corners = product(*zip(surface.low, surface.high, strict=True))
     if not any(surface.allows(x, y) for x, y in corners):
         raise LayoutError(f"within {within} there is no room around {tuple(around)}")
-    return Ground((surface,), {}, high)
+    return Surfaces((surface,), {}, high)
 
 
 def _no_ground(around: object) -> LayoutError:

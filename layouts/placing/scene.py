@@ -12,7 +12,7 @@ import numpy as np
 from layouts.frames import TABLE_DEPTH, Pose, table_outlines
 from layouts.layout import Layout
 from layouts.placement import Placement
-from layouts.placing.bases import BasePose, Ground
+from layouts.placing.bases import BasePose, Surfaces
 from layouts.validation.collisions import (
     FAR,
     Postures,
@@ -59,7 +59,7 @@ class SearchScene:
     """The robots of a search, and the ground that they may stand on."""
 
     def __init__(
-        self, robots: Mapping[str, RobotDescriptor], keyframe: str | None, ground: Ground
+        self, robots: Mapping[str, RobotDescriptor], keyframe: str | None, ground: Surfaces
     ) -> None:
         """Load what is needed.
 

@@ -21,7 +21,7 @@ from robot_layouts.core.bounds import (
 from robot_layouts.simulation import Camera, PhysicsSettings
 from robots import TaskError
 from tasks.engine.task import DENSE_MODES, Task
-from tasks.language.bodies import Body, Scene
+from tasks.language.bodies import Body, Surroundings
 from tasks.language.stages import check_stages
 from tasks.randomization.declaration import Randomization
 
@@ -89,8 +89,8 @@ _NEEDED: dict[str, tuple[Callable[[Any], bool], str]] = {
         "the camera's position and target are needed (m)",
     ),
     "table": (
-        lambda given: isinstance(given, Scene),
-        "a tasks.Scene is needed, such as tasks.Table(), and other bodies go by other names",
+        lambda given: isinstance(given, Surroundings),
+        "a tasks.Surroundings is needed, such as tasks.Table(), and other bodies go by other names",
     ),
 }
 """What an attribute must be: whether it is, and in words."""
@@ -198,7 +198,7 @@ def _check_bodies(cls: type[Task]) -> None:
     task = cls.__name__
     for base in reversed(cls.__mro__):
         for name, value in vars(base).items():
-            if isinstance(value, type) and issubclass(value, (Body, Scene)):
+            if isinstance(value, type) and issubclass(value, (Body, Surroundings)):
                 raise TaskError(
                     f"{task}.{name} is the class {value.__name__}; a body is one that it makes:"
                     f" {name} = {value.__name__}(…)"

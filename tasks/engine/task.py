@@ -14,7 +14,7 @@ from robot_layouts.simulation import Camera, PhysicsSettings, Simulation, State,
 from robot_layouts.simulation.maths import Array, Floats, copy
 from robots import UnknownNameError
 from tasks.engine.scenario import Scenario
-from tasks.language.bodies import Body, Declared, Scene, Table, declared_bodies
+from tasks.language.bodies import Body, Declared, Surroundings, Table, declared_bodies
 from tasks.language.fitting import AS_DECLARED, Fit
 from tasks.language.needs import Needs
 from tasks.language.randomness import EpisodeRandom
@@ -82,7 +82,7 @@ class Task:
         source: Where its numbers come from; of a clone package, version and file.
         layout: Default layout; in methods, that of the environments.
         table: What the robots stand at, the first of its bodies: a `tasks.Table`, or another
-            `tasks.Scene`, such as the bare `tasks.Ground`.
+            `tasks.Surroundings`, such as the bare `tasks.Ground`.
         bodies: The bodies that its class declares, by name, in the order declared; see
             `tasks.language.bodies`.
         robot_counts: How many robots a layout may have, in places of any names; None if it takes
@@ -140,7 +140,7 @@ class Task:
     native_id: ClassVar[str | None] = None
     source: ClassVar[str] = ""
     layout: Layout
-    table: ClassVar[Scene] = Table()
+    table: ClassVar[Surroundings] = Table()
     bodies: ClassVar[Mapping[str, Declared]] = {}
     robot_counts: ClassVar[range | None] = None
     needs: ClassVar[Mapping[str, Needs]] = {}

@@ -469,7 +469,7 @@ class Target(Body):
 
 
 @dataclass(frozen=True)
-class Scene(ABC):
+class Surroundings(ABC):
     """What robots stand in, under a task's ``table``: a table, a counter, or nothing but ground."""
 
     def outline(self, layout: Layout) -> Rectangle | None:
@@ -485,7 +485,7 @@ class Scene(ABC):
 
 
 @dataclass(frozen=True)
-class Table(Scene):
+class Table(Surroundings):
     """ManiSkill's table, 2.4 m × 1.2 m, its top at z = 0, and the floor below it.
 
     Attributes:
@@ -512,7 +512,7 @@ class Table(Scene):
 
 
 @dataclass(frozen=True)
-class WideTable(Scene):
+class WideTable(Surroundings):
     """A table under all robots of a layout, its top at z = 0, and the floor below it."""
 
     def outline(self, layout: Layout) -> Rectangle:
@@ -525,7 +525,7 @@ class WideTable(Scene):
 
 
 @dataclass(frozen=True)
-class Ground(Scene):
+class Ground(Surroundings):
     """ManiSkill's floor at z = 0, and no table: what robots work at are bodies of the task.
 
     Attributes:
@@ -548,7 +548,7 @@ class Ground(Scene):
 
 
 @dataclass(frozen=True)
-class KitchenCounter(Scene):
+class KitchenCounter(Surroundings):
     """ManiSkill's kitchen counter with a sink, and the floor at z = 0.
 
     Attributes:
@@ -570,7 +570,7 @@ class KitchenCounter(Scene):
         add_kitchen_counter(world, self.scale)
 
 
-Declared: TypeAlias = Body | Scene
+Declared: TypeAlias = Body | Surroundings
 
 
 def _turned(lying: Quaternion, turn: Quaternion) -> Quaternion:
@@ -599,5 +599,5 @@ def _bodies(task: type) -> Iterator[tuple[str, Declared]]:
     names = dict.fromkeys(name for cls in reversed(task.__mro__) for name in vars(cls))
     for name in names:
         value = getattr(task, name, None)
-        if isinstance(value, Body | Scene):
+        if isinstance(value, Body | Surroundings):
             yield name, value

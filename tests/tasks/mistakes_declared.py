@@ -168,7 +168,7 @@ MISTAKES = (
         dict(table=Cube(0.02)),
         (
             "Tray.table is Cube(spawn=None, start=None, kind='dyn..._size=0.02, color=(1.0, 0.0, "
-            "0.0, 1.0)); a tasks.Scene is needed, such as tasks.Table(), and other bodies "
+            "0.0, 1.0)); a tasks.Surroundings is needed, such as tasks.Table(), and other bodies "
             "go by other names"
         ),
     ),

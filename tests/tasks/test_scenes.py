@@ -82,5 +82,5 @@ def test_what_is_no_number_of_sizes_is_refused(sizes):
 
 
 def test_a_body_is_no_scene():
-    with pytest.raises(TaskError, match=r"table is Cube\(.*a tasks.Scene is needed"):
+    with pytest.raises(TaskError, match=r"table is Cube\(.*a tasks.Surroundings is needed"):
         tasks.register_task("OnCube-v1")(type("OnCube", (OnGround,), {"table": Cube(0.02)}))

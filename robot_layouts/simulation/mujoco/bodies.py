@@ -30,7 +30,7 @@ from robots.urdf.mesh_files import read_corners
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece(Shape):
+class _PieceHull(Shape):
     """The convex hull of a mesh's piece, of which there may be more corners than in `ConvexHull`.
 
     Attributes:
@@ -53,7 +53,7 @@ _TYPES: dict[type[Shape], Any] = {
     Floor: mujoco.mjtGeom.mjGEOM_PLANE,
     ConvexHull: mujoco.mjtGeom.mjGEOM_MESH,
     Mesh: mujoco.mjtGeom.mjGEOM_MESH,
-    _Piece: mujoco.mjtGeom.mjGEOM_MESH,
+    _PieceHull: mujoco.mjtGeom.mjGEOM_MESH,
 }
 _KINDS = {"slide": mujoco.mjtJoint.mjJNT_SLIDE, "turn": mujoco.mjtJoint.mjJNT_HINGE}
 _WEIGHTLESS = {"mass": 1.0, "inertia": [1.0, 1.0, 1.0], "explicitinertial": True}
@@ -135,7 +135,7 @@ class BodyMaker:
                 return {"size": [0.0, 0.0, 1.0]}
             case Floor():
                 return {"size": [shape.size / 2, shape.size / 2, 1.0]}
-            case _Piece(corners=corners):
+            case _PieceHull(corners=corners):
                 return {"meshname": self._add_hull(corners)}
             case ConvexHull():
                 return {"meshname": self._add_hull(np.array(shape.corners))}
@@ -162,7 +162,7 @@ def _solids(shape: Shape) -> Iterator[Shape]:
         yield shape
         return
     for corners in pieces(str(shape.path), shape.scale):
-        yield _Piece(
+        yield _PieceHull(
             position=shape.position,
             quaternion=shape.quaternion,
             friction=shape.friction,
