@@ -7,7 +7,7 @@ from layouts import single
 from objects.shapes import Mesh, Sphere
 from robot_layouts.simulation import Simulation, World
 from robot_layouts.simulation.checks.overlaps import stand
-from robots import SimulationError
+from robots import AssetError, SimulationError
 
 RADIUS, BOTTOM, RIM = 0.03, 0.01, 0.1  # m; of the ball, and how high the cup's are
 
@@ -46,6 +46,24 @@ def dropped(cup, collision, simulator):
 def test_a_ball_lies_in_a_cup_unless_its_hull_collides(cup, collision, below, simulator):
     height = dropped(cup, collision, simulator)
     assert height == pytest.approx(below + RADIUS, abs=2e-3)
+
+
+@pytest.mark.parametrize("simulator", ["sapien3", "mujoco"])
+@pytest.mark.parametrize("collision", ["hull", "pieces", "surface"])
+@pytest.mark.parametrize("name", ["none.ply", "empty.obj", "lie.glb", "flat.ply"])
+def test_a_file_that_is_no_solid_is_named(name, collision, simulator, tmp_path):
+    (tmp_path / "empty.obj").write_text("")
+    (tmp_path / "lie.glb").write_bytes(b"glTF not")
+    trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).export(tmp_path / "flat.ply")
+    with pytest.raises(AssetError, match=name):
+        dropped(tmp_path / name, collision, simulator)
+
+
+def test_flat_pieces_are_no_solid_in_mujoco(tmp_path):
+    sheets = [trimesh.creation.box((0.1, 0.1, 1e-9)).apply_translation((0, 0, z)) for z in (0, 1)]
+    trimesh.util.concatenate(sheets).export(tmp_path / "sheets.ply")
+    with pytest.raises(AssetError, match="no piece of the mesh"):
+        dropped(tmp_path / "sheets.ply", "pieces", "mujoco")
 
 
 def test_a_surface_of_a_body_that_physics_moves_is_refused(cup):

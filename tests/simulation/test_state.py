@@ -107,7 +107,7 @@ def test_contacts_of_unknown_names_are_refused_where_nothing_touches(env: TaskEn
         state.contact_force("left", "panda_leftfingr", "cube")
 
 
-def test_a_grasp_may_be_told_by_a_narrower_angle():
+def holding_a_tool():
     env = tasks.make("PullCubeTool-v1")
     env.reset(seed=0)
     world = env.simulation.worlds[0]
@@ -115,6 +115,11 @@ def test_a_grasp_may_be_told_by_a_narrower_angle():
     world.set_pose("l_shape_tool", (x - 0.05, y, z))
     for _ in range(3):
         env.step(torch.tensor([[0.0] * 7 + [-1.0]]))
+    return env
+
+
+def test_a_grasp_may_be_told_by_a_narrower_angle():
+    env = holding_a_tool()
     state = state_of(env)
     assert state.is_grasping("arm", "l_shape_tool").all()
     assert state.is_grasping("arm", "l_shape_tool", 90.0).all()
@@ -122,13 +127,7 @@ def test_a_grasp_may_be_told_by_a_narrower_angle():
 
 
 def test_other_links_than_a_robots_own_fingers_may_hold_a_body():
-    env = tasks.make("PullCubeTool-v1")
-    env.reset(seed=0)
-    world = env.simulation.worlds[0]
-    x, y, z = state_of(env).tcp_position("arm")[0].tolist()
-    world.set_pose("l_shape_tool", (x - 0.05, y, z))
-    for _ in range(3):
-        env.step(torch.tensor([[0.0] * 7 + [-1.0]]))
+    env = holding_a_tool()
     state, own = state_of(env), env.layout["arm"].robot.fingers
     assert own is not None
     outwards = replace(own, opening_signs=(-1, 1))

@@ -26,6 +26,7 @@ from objects.solids import pieces
 from robot_layouts.kinematics.rotations import Floats, multiply
 from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.world import WorldBody, part_name
+from robots import AssetError
 from robots.urdf.mesh_files import read_corners
 
 
@@ -157,11 +158,19 @@ def _solids(shape: Shape) -> Iterator[Shape]:
     """Yield what stands for a shape that collides.
 
     In MuJoCo, which lets nothing but convex bodies collide, a mesh's pieces stand for its surface.
+
+    Raises:
+        AssetError: If the file of a mesh cannot be read, or is empty or flat, or all its pieces.
     """
     if not isinstance(shape, Mesh) or shape.collision == "hull":
         yield shape
         return
-    for corners in pieces(str(shape.path), shape.scale):
+    file = str(shape.path)
+    read_corners(file, shape.scale, file, file)  # what cannot be read is refused as a hull is
+    found = pieces(file, shape.scale)
+    if not found:
+        raise AssetError(f"{file}: no piece of the mesh that hangs together has a volume")
+    for corners in found:
         yield _PieceHull(
             position=shape.position,
             quaternion=shape.quaternion,

@@ -18,6 +18,8 @@ from robot_layouts.simulation.maths import Floats
 from robot_layouts.simulation.sapien3.blueprint import FLOOR
 from robot_layouts.simulation.sapien3.builder import joint_frame
 from robot_layouts.simulation.world import WorldBody, part_name
+from robots import AssetError
+from robots.urdf.mesh_files import has_body
 
 _STILL = np.zeros(3, np.float32)
 _KINDS = {"slide": "prismatic", "turn": "revolute_unwrapped"}
@@ -231,7 +233,11 @@ _SIZES = ("half_size", "radius", "half_length", "scale", "vertices", "triangles"
 
 
 def add_collision(builder: Any, shape: Shape) -> None:
-    """Add a shape to a SAPIEN actor builder, if it takes part in contacts and is no hull."""
+    """Add a shape to a SAPIEN actor builder, if it takes part in contacts and is no hull.
+
+    Raises:
+        AssetError: If the file of a mesh cannot be read, or is empty or flat.
+    """
     if not shape.collides or isinstance(shape, ConvexHull):
         return
     common: dict[str, Any] = {"pose": _pose(shape), "material": _material(shape)}
@@ -248,8 +254,10 @@ def add_collision(builder: Any, shape: Shape) -> None:
         case Capsule():
             add, sizes = builder.add_capsule_collision, _round_sizes(shape)
         case Mesh():
-            add = getattr(builder, _MESHES[shape.collision])
-            sizes = {"filename": str(shape.path), "scale": list(shape.scale)}
+            file, add = str(shape.path), getattr(builder, _MESHES[shape.collision])
+            if not has_body(file, shape.scale, file, file):
+                raise AssetError(f"{file}: the mesh is flat, so that it cannot collide")
+            sizes = {"filename": file, "scale": list(shape.scale)}
         case _:
             raise TypeError(f"no collision for {type(shape).__name__}")
     patch = {"patch_radius": shape.patch_radius, "min_patch_radius": shape.min_patch_radius}
