@@ -37,6 +37,7 @@ def _g1(position: Vector3, **place: object) -> Layout:
 
 _panda = partial(single, {"arm": "panda"})
 _panda_wristcam = partial(single, {"arm": "panda_wristcam"})
+_panda_stick = partial(_one, "panda_stick", qpos_noise=0.0)
 _dclaw = partial(
     _one,
     "dclaw",
@@ -48,7 +49,7 @@ _dclaw = partial(
 # id -> (how to build the layout, where native has its numbers), sorted by id.
 TASKS: Mapping[str, tuple[Callable[[], Layout], str]] = {
     "DrawTriangle-v1": (
-        partial(_one, "panda_stick", qpos_noise=0.0),
+        _panda_stick,
         "envs/tasks/drawing/draw_triangle.py: TableSceneBuilder(robot_init_qpos_noise=0)",
     ),
     "FMBAssembly1Easy-v1": (_panda, TABLE),
@@ -81,6 +82,10 @@ TASKS: Mapping[str, tuple[Callable[[], Layout], str]] = {
     **{f"RotateValveLevel{level}-v1": (_dclaw, ROTATE_VALVE) for level in range(5)},
     "StackCube-v1": (_panda_wristcam, TABLE),
     "StackPyramid-v1": (_panda_wristcam, TABLE),
+    "TableTopFreeDraw-v1": (
+        _panda_stick,
+        "envs/tasks/drawing/draw.py: TableSceneBuilder(robot_init_qpos_noise=0)",
+    ),
     "TwoRobotPickCube-v1": (partial(_two, "panda_wristcam", 1.5), TABLE),
     "TwoRobotStackCube-v1": (partial(_two, "panda_wristcam", 1.5), TABLE),
     "UnitreeG1PlaceAppleInBowl-v1": (

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from robots import TaskError
 from tasks import TaskEnv
 from tasks.arrays import row_of, stacked
+from tasks.engine.outcome import solved
 from tasks.language.stages import STAGE_SCORE
 
 States = dict[str, dict[str, NDArray[np.float32]]]
@@ -163,6 +164,11 @@ class StepResult(NamedTuple):
     elapsed: int = 0
     stage_score: float | None = None
 
+    @property
+    def failure(self) -> str:
+        """In words that the task says that the episode is lost; empty if it does not."""
+        return "the task counts it as failed" if self.terminated and not self.success else ""
+
 
 def moments(
     task: TaskEnv,
@@ -210,7 +216,7 @@ def take_step(task: TaskEnv, action: Any) -> StepResult:
     began = perf_counter()
     observation, reward, terminated, truncated, info = task.step(action)
     seconds = perf_counter() - began
-    success, over, late = bool(info["success"]), bool(terminated), bool(truncated)
+    success, over, late = bool(solved(info)), bool(terminated), bool(truncated)
     elapsed = int(info["elapsed_steps"])
     stage = info[STAGE_SCORE].item() if STAGE_SCORE in info else None
     return StepResult(observation, reward.item(), success, over, late, seconds, elapsed, stage)

@@ -101,6 +101,7 @@ CATALOGUE = {
     "RotateValveLevel4-v1": "tasks.maniskill.rotate_valve:RotateValveLevel4",
     "StackCube-v1": "tasks.maniskill.stack_cube:StackCube",
     "StackPyramid-v1": "tasks.maniskill.stack_pyramid:StackPyramid",
+    "TableTopFreeDraw-v1": "tasks.maniskill.table_top_free_draw:TableTopFreeDraw",
     "TwoRobotHandOver-v1": "tasks.originals.two_robot_hand_over:TwoRobotHandOver",
     "TwoRobotLiftBar-v1": "tasks.originals.two_robot_lift_bar:TwoRobotLiftBar",
     "TwoRobotPickCube-v1": "tasks.maniskill.two_robot_pick_cube:TwoRobotPickCube",

@@ -267,6 +267,13 @@ def fmb_assembly(puppeteer: Puppeteer) -> None:
     puppeteer.move(10, CLOSED, {"arm": ((0.13, 0.02, 0.05), hand)})
 
 
+def draw(puppeteer: Puppeteer) -> None:
+    """Press a stick on the canvas and draw a bow; lift it, and draw another dot."""
+    for steps, joints in ((45, (0, 1, 0, -0.4)), (15, (1, 0, 0, 0)), (15, (0, -1)), (20, (0, 1))):
+        for _ in range(steps):
+            puppeteer.play(np.array([*joints, *[0] * (7 - len(joints))], np.float32))
+
+
 def touch_something(puppeteer: Puppeteer) -> None:
     """Reach for the first movable body with every robot in turn; for tasks not listed below."""
     bodies = [
@@ -293,6 +300,7 @@ MOTIONS: dict[str, Callable[[Puppeteer], None]] = {
     "PokeCube-v1": poke_cube,
     "PushT-v1": push_t,
     **{f"RotateValveLevel{level}-v1": turn_valve for level in range(5)},
+    "TableTopFreeDraw-v1": draw,
     "TwoRobotPickCube-v1": two_robot_pick_cube,
     "UnitreeG1PlaceAppleInBowl-v1": close_on_apple,
     "UnitreeG1TransportBox-v1": lift_box,

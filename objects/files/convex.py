@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,13 @@ _COACD = {  # its settings: a search that takes seconds, and is as good for thin
     "mcts_max_depth": 2,
     "seed": 0,
 }
+_FINE = {"threshold": 0.01, "mcts_iterations": 60, "seed": 0}  # for what others are to fit into
 _DIGITS = 7  # of a coordinate (m)
 
 
-def convex_parts(mesh: Any, most: int, where: str) -> list[tuple[Place, ...]]:
+def convex_parts(
+    mesh: Any, most: int, where: str, *, fine: bool = False
+) -> list[tuple[Place, ...]]:
     """Return the corners of convex parts that fill a mesh (m).
 
     Bodies of the mesh that are convex are parts as they are. What is hollow is taken apart by
@@ -41,6 +44,7 @@ def convex_parts(mesh: Any, most: int, where: str) -> list[tuple[Place, ...]]:
         mesh: A trimesh whose faces share their corners.
         most: How many parts there may be; 1 takes the convex hull of all.
         where: The file, for messages.
+        fine: Whether its hollows are to be right to a hundredth of its size, not a twentieth.
 
     Raises:
         DescriptorError: If nothing of the mesh has a volume.
@@ -52,7 +56,7 @@ def convex_parts(mesh: Any, most: int, where: str) -> list[tuple[Place, ...]]:
     elif len(bodies) <= _MOST_BODIES and all(_is_convex(*body) for body in bodies):
         parts = [corners for corners, _ in bodies]
     else:
-        parts = _taken_apart(mesh, most, where)
+        parts = _taken_apart(mesh, most, where, _FINE if fine else _COACD)
     limit = MOST_CORNERS if len(parts) == 1 else _FEW
     found = [rounded(few_corners(part, limit)) for part in parts if hull_of(part) is not None]
     if not found:
@@ -134,7 +138,7 @@ def _is_convex(corners: Floats, triangles: NDArray[np.intp]) -> bool:
     return bool(around > 0 and volume >= _CONVEX * around)
 
 
-def _taken_apart(mesh: Any, most: int, where: str) -> list[Floats]:
+def _taken_apart(mesh: Any, most: int, where: str, settings: Mapping[str, Any]) -> list[Floats]:
     what = (
         f"{where} is hollow; taking it apart needs CoACD (its convex hull does not: most_parts=1)"
     )
@@ -144,7 +148,7 @@ def _taken_apart(mesh: Any, most: int, where: str) -> list[Floats]:
     parts = coacd.run_coacd(
         coacd.Mesh(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int32)),
         max_convex_hull=most,
-        **_COACD,
+        **settings,
     )
     return [np.asarray(corners, float) for corners, _ in parts]
 

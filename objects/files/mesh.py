@@ -16,13 +16,13 @@ from objects.files.convex import MOST_PARTS, convex_parts, hull_volume
 from objects.files.grasps import POINTS, proposed
 from objects.files.remembering import Files, remembered
 from objects.files.rests import resting
-from objects.shapes import GREY, Color, ConvexHull, Friction, Mesh, Shape
+from objects.shapes import GREY, Color, ConvexHull, Friction, Mesh, Place, Shape
 from objects.solids import mass_of
 from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole
 from robot_layouts.core.errors import AssetError, DescriptorError, UnreadableFileError
 from robot_layouts.core.files import read_regular
 from robot_layouts.core.paths import absolute
-from robot_layouts.kinematics.rotations import rotate
+from robot_layouts.kinematics.rotations import Floats, rotate
 from robots.descriptor import IDENTITY, Quaternion
 from robots.urdf.mesh_files import MAX_MESH_BYTES, load_scene
 
@@ -35,6 +35,7 @@ _TURNS: dict[str, Quaternion] = {  # from the file's frame to one whose z axis p
     "z": IDENTITY,
 }
 _WATER = 1000.0  # kg/m³
+_MOST = 128  # parts that stand for a surface
 _FEW, _MANY = 20, 8  # grasps, and how many times as many places are tried where there are fewer
 
 
@@ -73,6 +74,30 @@ def thing_from_mesh(
         "licence": UNKNOWN,
     }
     return ObjectDescriptor(**{**given, **fields})
+
+
+def convex_hulls(path: str, scale: Place) -> list[Floats]:
+    """Return the corners, (n, 3) each (m), of convex parts that fill what a mesh file's surface is.
+
+    They are found once, and kept in the local copy.
+
+    Args:
+        path: The file.
+        scale: Factors along x, y and z.
+
+    Raises:
+        AssetError: If it cannot be read as a mesh, or is empty.
+        DescriptorError: If it has no volume.
+        MissingPackageError: If it is hollow and the package coacd is not installed.
+    """
+    file = Path(path)
+
+    def made() -> tuple[Made, Files]:
+        parts = convex_parts(_mesh(file), _MOST, path, fine=True)
+        return Made([ConvexHull(corners) for corners in parts]), {}
+
+    hulls = remembered(_contents(file), ("surface", _MOST), None, made).parts
+    return [np.array(hull.corners) * scale for hull in hulls if isinstance(hull, ConvexHull)]
 
 
 def _finished(part: Shape, ratio: float, looks: dict[str, Any], *, textured: bool) -> Shape:

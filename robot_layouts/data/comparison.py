@@ -17,6 +17,7 @@ from robot_layouts.simulation.backend import CLONING, SIMULATORS
 from robots import TaskError
 from tasks import TaskEnv, make
 from tasks.cell_options import RecordedCell, Simulator
+from tasks.engine import outcome
 from tasks.episode import REBUILT
 
 SEEN = 1e-3  # m; what is less far apart counts as at the same place
@@ -59,7 +60,7 @@ def compare(envs: Mapping[str, TaskEnv], seed: int, actions: NDArray[np.float32]
         places = list[dict[str, NDArray[np.float32]]]()
         for name, env in envs.items():
             info = env.step(action[None])[-1]
-            solved[name] |= bool(info["success"][0])
+            solved[name] |= bool(outcome.solved(info)[0])
             places.append(_places(env))
         first, second = places
         ways = {name: float(np.linalg.norm(first[name] - second[name])) for name in first}

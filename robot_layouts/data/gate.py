@@ -21,6 +21,7 @@ from robot_layouts.simulation.backend import Overlap
 from robots import TaskError
 from tasks import TaskEnv, get_task_class, make
 from tasks.cell_options import CellOptions
+from tasks.engine import outcome
 from tasks.engine.task import DENSE_MODES
 from tasks.episode import REBUILT
 from tasks.language.stages import STAGE, STAGE_SCORE
@@ -151,7 +152,7 @@ class _Episodes:
         return found
 
     def play(self, who: str, seed: int, actions: NDArray[np.float32] | None = None) -> PlayedOnce:
-        """Play actions, (T, A), or random ones, until success or the time is over."""
+        """Play actions, (T, A), or random ones, until the episode ends or they do."""
         self._tell(f"seed {seed}, {who}")
         env, told, touching = self._env, list[tuple[float, int, float]](), ""
         env.reset(seed, REBUILT)
@@ -162,16 +163,17 @@ class _Episodes:
         self._watch.touching()
         success, skipped = False, ()
         for action in actions:
-            _, reward, done, _, info = env.step(action[None])
+            _, reward, ended, _, info = env.step(action[None])
             before = told[-1][1] if told else 0
             stage, score = info.get(STAGE, 0), info.get(STAGE_SCORE, 0.0)
             told.append((float(reward), int(stage), float(score)))
             touching = touching or ", ".join(
                 f"{a} touches {b}" for a, b in self._watch.touching()[:1]
             )
-            if success := bool(done):
+            if success := bool(outcome.solved(info)):
                 left = list(env.task.stages)[before:]
                 skipped = tuple(name for name in left if not info[name])
+            if ended:
                 break
         rewards, _, scores = np.array(told).reshape(-1, 3).T
         return PlayedOnce(success, rewards, scores, skipped, touching)

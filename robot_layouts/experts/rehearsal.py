@@ -110,14 +110,16 @@ class Rehearsal:
         """Take a control step.
 
         Returns:
-            Whether the task is solved then, and which arms touched in it, in words.
+            Whether the task is solved then, and in words why it cannot be any more: which arms
+            touched in it, or that the task counts it as failed.
         """
         self.fresh = False
         moment = take_step(self.task, action)
         if self._tape is not None:
             self._tape.add(action, moment)
         touching = self._watch.touching() if self._watch is not None else []
-        return moment.success, ", ".join(f"{a} touches {b}" for a, b in touching[:1])
+        touched = ", ".join(f"{a} touches {b}" for a, b in touching[:1])
+        return moment.success, touched or moment.failure
 
     def episode(self, actions: NDArray[np.float32]) -> PlayedEpisode | None:
         """Return what happened since `begin`, if it followed from these actions, (T, A), alone.
@@ -133,7 +135,7 @@ class Rehearsal:
     def play(self, script: Script, *, around: bool = False, until: str | None = None) -> Attempt:
         """Play a script from the present state until success or the end of the episode.
 
-        It fails as soon as two arms touch: robots, or limbs of one robot.
+        It fails as soon as two arms touch, robots or limbs of one robot, or the task is lost.
 
         Args:
             script: Waypoints by robot; robots left out keep still.
@@ -164,10 +166,10 @@ class Rehearsal:
             if until in done:
                 return Attempt(_stack(actions, task), True)
             actions.append(np.concatenate(parts).astype(np.float32))
-            solved, touching = self.step(actions[-1])
+            solved, lost = self.step(actions[-1])
             scene = self.scene()
-            if touching:
-                return Attempt(_stack(actions, task), False, touching, True)
+            if lost:
+                return Attempt(_stack(actions, task), False, lost, True)
             if solved:
                 return Attempt(_stack(actions, task), True)
         places = ", ".join(player.place for player in players)
@@ -312,13 +314,13 @@ def rehearse(task: TaskEnv, seed: int, act: Callable[[Scene], Any]) -> Plan:
 def _closed_loop(rehearsal: Rehearsal, seed: int, act: Callable[[Scene], Any]) -> Attempt:
     copy, scene = rehearsal.task, rehearsal.begin(seed)
     reader, actions = ActionReader(copy.layout, 1), list[NDArray[np.float32]]()
-    success, touching = False, ""
-    while not (success or touching) and len(actions) < copy.max_episode_steps:
+    success, lost = False, ""
+    while not (success or lost) and len(actions) < copy.max_episode_steps:
         actions.append(reader.read(act(scene))[0].copy())
-        success, touching = rehearsal.step(actions[-1])
+        success, lost = rehearsal.step(actions[-1])
         scene = rehearsal.scene()
-    success = success and not touching
-    reason = "" if success else touching or f"no success within {len(actions)} steps"
+    success = success and not lost
+    reason = "" if success else lost or f"no success within {len(actions)} steps"
     done = np.stack(actions)
     return Attempt(done, success, reason, episode=rehearsal.episode(done))
 

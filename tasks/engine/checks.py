@@ -20,13 +20,12 @@ from robot_layouts.simulation import State
 from robot_layouts.simulation.maths import Array
 from robots import TaskError, unknown_name_message
 from tasks.arrays import array_of
+from tasks.engine.outcome import ELAPSED, FAILED, SOLVED
 
 RECONFIGURE = "reconfigure"  # option of a reset, and in its info: whether worlds are rebuilt
 INSTRUCTION = "instruction"  # in info, of tasks that have several: what is to be done
-ELAPSED = "elapsed_steps"  # in info: control steps since the reset
 SEED = "seed"  # in the info of interfaces: what the random streams began with
 SUCCESS = "is_success"  # there, too: what other packages call success
-SOLVED = "success"  # what `evaluate` calls it
 
 
 def checked_ids(env_ids: Sequence[int] | None, num_envs: int) -> list[int]:
@@ -162,6 +161,7 @@ class ReturnedArrays:
         *,
         axes: int | None = None,
         judges: bool = False,
+        open_ended: bool = False,
     ) -> None:
         """Take what is known before it is called.
 
@@ -169,10 +169,13 @@ class ReturnedArrays:
             method: The method in words.
             num_envs: Number of environments N.
             axes: How many axes each array may have; None for any number.
-            judges: Whether it is `evaluate`, whose arrays include ``success``, of flags.
+            judges: Whether it is `evaluate`, whose arrays include ``success``, of flags, and may
+                include ``fail``.
+            open_ended: Whether it may not include ``success``.
         """
         self.method = method
-        self._num_envs, self._axes, self._judges = num_envs, axes, judges
+        self._num_envs, self._axes = num_envs, axes
+        self._judges, self._open_ended = judges, open_ended
         self._names: list[str] | None = None  # as long as it was not called
         self._forms: list[tuple[np.dtype[Any], tuple[int, ...]]] = []
 
@@ -215,20 +218,29 @@ class ReturnedArrays:
         return arrays
 
     def _check_first(self, arrays: Mapping[str, NDArray[Any]]) -> None:
-        if self._judges and SOLVED not in arrays:
+        if not self._judges:
+            return
+        if self._open_ended and SOLVED in arrays:
+            raise TaskError(
+                f"{self.method} returned {SOLVED!r}, and the task says open_ended = True; drop one"
+                " of the two"
+            )
+        if not self._open_ended and SOLVED not in arrays:
             raise TaskError(
                 f"{self.method} returned no {SOLVED!r}, (N,) bool, which says where the task is"
-                f" solved; it returned: {', '.join(arrays) or 'nothing'}"
+                f" solved; it returned: {', '.join(arrays) or 'nothing'}. A task that is never"
+                " solved says open_ended = True"
             )
-        if self._judges and ELAPSED in arrays:
+        if ELAPSED in arrays:
             raise TaskError(
                 f"{self.method} returned {ELAPSED}, which info already has; call it something else"
             )
-        if self._judges and arrays[SOLVED].dtype != bool:
-            raise TaskError(
-                f"{self.method} returned {SOLVED!r} as {_form(arrays[SOLVED])}; it must be bool,"
-                " as comparisons give it: distance <= 0.02"
-            )
+        for name in {SOLVED, FAILED} & arrays.keys():
+            if arrays[name].dtype != bool:
+                raise TaskError(
+                    f"{self.method} returned {name!r} as {_form(arrays[name])}; it must be bool,"
+                    " as comparisons give it: distance <= 0.02"
+                )
 
     def _refuse_names(self, arrays: Mapping[str, NDArray[Any]], names: Sequence[str]) -> NoReturn:
         more = [name for name in arrays if name not in names]
@@ -247,7 +259,7 @@ class ReturnedArrays:
         what = f"{self.method} returned {shown(name)} as"
         if not isinstance(name, str) or not name:
             raise TaskError(f"{self.method} returned the name {shown(name)}; names must be texts")
-        most = 1 if self._judges and name == SOLVED else self._axes
+        most = 1 if self._judges and name in (SOLVED, FAILED) else self._axes
         shape = _shape_text(self._num_envs, most)
         array = _as_array(value, what, f"an array of shape {shape}")
         if not 1 <= array.ndim <= (most or array.ndim) or len(array) != self._num_envs:

@@ -190,6 +190,7 @@ def _check_attributes(cls: type[Task]) -> None:
     checked_whole(f"{task}.first_seed", cls.first_seed, 0, 2**32 - 1, TaskError)
     checked_flag(f"{task}.rebuilds", cls.rebuilds, TaskError)
     checked_flag(f"{task}.double_rewards", cls.double_rewards, TaskError)
+    checked_flag(f"{task}.open_ended", cls.open_ended, TaskError)
     for what, point in zip(("position", "target"), cls.viewpoint, strict=True):
         checked_numbers(f"{task}.viewpoint's {what}", point, 3, 1e6, TaskError, "m")
 

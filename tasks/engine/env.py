@@ -21,10 +21,10 @@ from robot_layouts.simulation.framed import Fit, FramedState, FramedWorld
 from robot_layouts.simulation.maths import Array, Floats, all_finite
 from robot_layouts.simulation.world import Part
 from robots import SimulationError, TaskError
+from tasks.engine import outcome
 from tasks.engine.actions import ActionReader
 from tasks.engine.cameras import camera_for_people
 from tasks.engine.checks import (
-    ELAPSED,
     INSTRUCTION,
     ReturnedArrays,
     ReturnedReward,
@@ -45,6 +45,7 @@ from tasks.engine.divergence import (
     refuse_state,
 )
 from tasks.engine.observation import Observer, read_mode, space_of
+from tasks.engine.outcome import ELAPSED
 from tasks.engine.pictures import tiled
 from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
@@ -343,7 +344,7 @@ class TaskEnv(Remade):
 
         Returns:
             Observation, reward (N,) float32, terminated (N,), truncated (N,), info. An
-            environment terminates when it succeeds. See `Task.double_rewards`.
+            environment terminates when it succeeds or fails. See `Task.double_rewards`.
 
         Raises:
             ActionError: If the action has a wrong shape, type or number; nothing moves then.
@@ -389,7 +390,7 @@ class TaskEnv(Remade):
         obs = self._observation(state, info, moving)
         reward = self._reward(state, flat, info)
         truncated = self._elapsed >= self.task.max_episode_steps
-        return obs, reward, info["success"].copy(), truncated, info
+        return obs, reward, outcome.ended(info), truncated, info
 
     def trust(self, actions: Floats) -> None:
         """Take what is in this very array, (N, A), as actions that were checked before."""
@@ -490,7 +491,10 @@ class TaskEnv(Remade):
     def _expect_returns(self, name: str) -> None:
         """Say what the methods of the class must return."""
         count = self.num_envs
-        self._judged = ReturnedArrays(f"{name}.evaluate()", count, judges=True)
+        open_ended = self.task.open_ended
+        self._judged = ReturnedArrays(
+            f"{name}.evaluate()", count, judges=True, open_ended=open_ended
+        )
         self._observed = ReturnedArrays(f"{name}.observe()", count, axes=2)
         self._remembered = ReturnedArrays(f"{name}.remember()", count)
         double = self.task.double_rewards
@@ -632,7 +636,7 @@ class TaskEnv(Remade):
             case "dense":
                 return self._dense(state, action, info)
             case "sparse":
-                return info["success"].astype(np.float32)
+                return outcome.sparse(info).astype(np.float32)
             case _:
                 return np.zeros(self.num_envs, np.float32)
 

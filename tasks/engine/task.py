@@ -98,7 +98,8 @@ class Task:
         physics: Solver settings; None keeps SAPIEN's own defaults.
         randomization: What varies from episode to episode; None for nothing.
         max_episode_steps: Control steps until an episode is truncated.
-        reward_modes: Reward modes, the default first.
+        open_ended: Whether nothing counts as success, so that `evaluate` returns none.
+        reward_modes: Reward modes, the default first; ``sparse`` is left out if it is open-ended.
         max_reward: What ``normalized_dense`` divides the dense reward by.
         double_rewards: Whether dense rewards are float64, as in some of ManiSkill's tasks.
         first_seed: Environment i starts with seed ``first_seed + i`` when it is made.
@@ -149,6 +150,7 @@ class Task:
     physics: ClassVar[PhysicsSettings | None] = None
     randomization: ClassVar[Randomization | None] = None
     max_episode_steps: int
+    open_ended: ClassVar[bool] = False
     reward_modes: ClassVar[tuple[str, ...]] = ()
     max_reward: ClassVar[float] = 1.0
     double_rewards: ClassVar[bool] = False
@@ -170,7 +172,8 @@ class Task:
         cls.bodies = declared_bodies(cls)
         if "reward_modes" not in cls.__dict__:
             dense = cls.dense_reward is not Task.dense_reward
-            cls.reward_modes = DENSE_MODES if dense else SPARSE_MODES
+            modes = DENSE_MODES if dense else SPARSE_MODES
+            cls.reward_modes = tuple(m for m in modes if not cls.open_ended or m != "sparse")
 
     @classmethod
     def fits(cls) -> bool:
@@ -211,6 +214,9 @@ class Task:
 
     def evaluate(self, state: State) -> dict[str, Array]:
         """Return ``success`` (N,) bool and whatever else describes the state.
+
+        ``fail`` (N,) bool says where an episode is lost: it ends there, as it does with success,
+        and the sparse reward is -1. An `open_ended` task leaves ``success`` out.
 
         Arrays, as the state gives them: they reach the user as tensors.
         """

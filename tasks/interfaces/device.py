@@ -15,10 +15,12 @@ from torch import Tensor
 from robot_layouts.core.bounds import checked_whole, shown
 from robot_layouts.simulation.mujoco_warp.state import beside
 from robots import ActionError, SimulationError, TaskError
+from tasks.engine import outcome
 from tasks.engine.actions import given_robots
-from tasks.engine.checks import ELAPSED, SEED, SOLVED, SUCCESS, checked_options, checked_seeds
+from tasks.engine.checks import SEED, SUCCESS, checked_options, checked_seeds
 from tasks.engine.env import TaskEnv
 from tasks.engine.observation import JOINTS, STATE_FORMS, TIPS, tip_links
+from tasks.engine.outcome import ELAPSED, SOLVED
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import Scenario
 from tasks.engine.task import Info, Memory, Task
@@ -225,7 +227,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
         obs = _each(self._observation(state, info), lambda part: _zeroed(part, lost))
         reward = _zeroed(self._reward(state, action, info), lost | begun)
         ended = lost | (self._elapsed >= self.task.max_episode_steps)
-        terminated = (info[SOLVED] & ~(lost | begun)) if not self._ignores else self._nowhere
+        terminated = (outcome.ended(info) & ~(lost | begun)) if not self._ignores else self._nowhere
         truncated = ended & ~begun
         self._over = over = terminated | truncated
         if mode is AutoresetMode.SAME_STEP:
@@ -308,7 +310,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
             DIVERGED: ~finite,
             OVERFLOWED: self._simulation.bodies.overflowed,
             SEED: self._started.clone(),
-            SUCCESS: info[SOLVED],
+            **({SUCCESS: info[SOLVED]} if SOLVED in info else {}),
         }
 
     def _observation(self, state: Any, info: Info) -> Any:
@@ -340,7 +342,7 @@ class DeviceTask(Remade, VectorEnv[Any, Any, Any]):
 
     def _reward(self, state: Any, action: Any, info: Info) -> Tensor:
         if self._reward_mode == "sparse":
-            return info[SOLVED].float()
+            return outcome.sparse(info).float()
         if self._reward_mode == "none":
             return torch.zeros(self.num_envs, device=self.device)
         reward: Any = self.task.dense_reward(state, action, info)

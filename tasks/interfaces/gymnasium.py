@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from robots import TaskError
 from tasks.engine.checks import RECONFIGURE, SEED, SUCCESS, checked_seeds, own_options
 from tasks.engine.observation import observed_dtype, space_of
+from tasks.engine.outcome import SOLVED
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import RENDER_MODES
 from tasks.language.randomness import FirstSeeds
@@ -169,6 +170,7 @@ def info_row(info: Mapping[str, Any], seed: int) -> dict[str, Any]:
         for key, value in info.items()
         if key != RECONFIGURE
     }
-    row_info[SUCCESS] = row_info["success"]
+    if SOLVED in row_info:
+        row_info[SUCCESS] = row_info[SOLVED]
     row_info[SEED] = seed
     return row_info

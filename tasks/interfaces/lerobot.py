@@ -124,7 +124,7 @@ class LeRobotTask(Remade, VectorEnv[dict[str, Any], NDArray[np.float32], NDArray
         running = ~(self._terminated | self._truncated)
         self._terminated |= terminated & running
         self._truncated |= truncated & running
-        self._solved |= info[SUCCESS] & (terminated | truncated) & running
+        self._solved |= info.get(SUCCESS, False) & (terminated | truncated) & running
         info[SUCCESS] = self._solved.copy()
         reward[~running] = 0.0
         flags = self._terminated.copy(), self._truncated.copy()

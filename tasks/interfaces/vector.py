@@ -22,6 +22,7 @@ from tasks.arrays import nested, row_of
 from tasks.engine.actions import ActionReader
 from tasks.engine.checks import RECONFIGURE, SUCCESS, checked_ids, checked_options, checked_seeds
 from tasks.engine.observation import space_of
+from tasks.engine.outcome import SOLVED
 from tasks.engine.places import built_layout
 from tasks.engine.remade import Remade
 from tasks.engine.scenario import RENDER_MODES
@@ -492,7 +493,7 @@ class _Results:
                 for name in self._backend.arrays
                 for first, _, key in [name.partition("/")]
                 if first == prefix
-                for called in ((key, SUCCESS) if key == "success" else (key,))
+                for called in ((key, SUCCESS) if key == SOLVED else (key,))
             ]
             self._names[prefix] = found
         arrays = self._backend.arrays

@@ -114,7 +114,7 @@ def test_the_hash_is_of_the_content_of_layouts(whole):
 
 
 # Newer than the suite, which never changes.
-LATER = "Cell", "FMBAssembly1Easy", "RotateValve", "TwoRobotHandOver", "UnitreeG1"
+LATER = "Cell", "FMBAssembly1Easy", "RotateValve", "TableTop", "TwoRobotHandOver", "UnitreeG1"
 NEWER = {name for name in CATALOGUE if name.startswith(LATER)}
 
 

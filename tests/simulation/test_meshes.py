@@ -49,6 +49,16 @@ def test_a_ball_lies_in_a_cup_unless_its_hull_collides(cup, collision, below, si
 
 
 @pytest.mark.parametrize("simulator", ["sapien3", "mujoco"])
+def test_a_surface_of_one_piece_is_hollow_where_it_is(tmp_path, simulator):
+    outside, inside = trimesh.creation.box((0.2, 0.2, RIM)), trimesh.creation.box((0.16, 0.16, RIM))
+    inside.apply_translation((0, 0, BOTTOM))
+    cup = trimesh.boolean.difference([outside, inside]).apply_translation((0, 0, RIM / 2))
+    cup.export(tmp_path / "cup.ply")
+    height = dropped(tmp_path / "cup.ply", "surface", simulator)
+    assert height == pytest.approx(BOTTOM + RADIUS, abs=2e-3)
+
+
+@pytest.mark.parametrize("simulator", ["sapien3", "mujoco"])
 @pytest.mark.parametrize("collision", ["hull", "pieces", "surface"])
 @pytest.mark.parametrize("name", ["none.ply", "empty.obj", "lie.glb", "flat.ply"])
 def test_a_file_that_is_no_solid_is_named(name, collision, simulator, tmp_path):

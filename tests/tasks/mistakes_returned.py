@@ -25,7 +25,7 @@ MISTAKES = (
         evaluating(lambda state: {"solved": success(state)}),
         (
             "Tray.evaluate() returned no 'success', (N,) bool, which says where the task is "
-            "solved; it returned: solved"
+            "solved; it returned: solved. A task that is never solved says open_ended = True"
         ),
     ),
     Mistake(
@@ -42,6 +42,22 @@ MISTAKES = (
         (
             "Tray.evaluate() returned 'success' as float64 of shape (2,); it must be bool, as "
             "comparisons give it: distance <= 0.02"
+        ),
+    ),
+    Mistake(
+        "failure as numbers",
+        evaluating(lambda state: {"success": success(state), "fail": success(state) * 1.0}),
+        (
+            "Tray.evaluate() returned 'fail' as float64 of shape (2,); it must be bool, as "
+            "comparisons give it: distance <= 0.02"
+        ),
+    ),
+    Mistake(
+        "success of what is never solved",
+        {"open_ended": True, **evaluating(lambda state: {"success": success(state)})},
+        (
+            "Tray.evaluate() returned 'success', and the task says open_ended = True; drop one of "
+            "the two"
         ),
     ),
     Mistake(

@@ -24,7 +24,7 @@ APART = 1e-4  # rad, m: how far float32 may be from MuJoCo's float64
 SHORT = np.float32(0.99)
 OBSERVED = 2e-3  # of observations, which have speeds in them (rad/s)
 REFUSED = {
-    "DrawTriangle-v1": "one by one",
+    **dict.fromkeys(("DrawTriangle-v1", "TableTopFreeDraw-v1"), "one by one"),
     "PegInsertionSide-v1": "geometry changes",
     **{f"RotateValveLevel{level}-v1": "geometry changes" for level in range(5)},
 }

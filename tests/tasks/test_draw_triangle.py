@@ -4,7 +4,6 @@ import torch
 import tasks
 from robots import SimulationError
 from tasks import TaskEnv
-from tasks.maniskill.draw_triangle import MAX_DOTS
 
 STILL = torch.zeros(1, 7)
 DOWN = torch.tensor([[0.0, 1.0, 0.0, -0.4, 0.0, 0.0, 0.0]])  # until the stick presses the canvas
@@ -15,15 +14,20 @@ def drawn(env: TaskEnv, index: int = 0) -> list[str]:
     return [name for name, rows in actors.items() if name[:3] == "dot" and rows[index, 2] > 0]
 
 
-def test_the_dots_are_used_up_one_per_step_and_then_it_says_so():
-    env = tasks.make("DrawTriangle-v1", num_envs=2)
+@pytest.mark.parametrize(
+    ("task", "dots"), [("DrawTriangle-v1", 300), ("TableTopFreeDraw-v1", 1010)]
+)
+def test_the_dots_are_used_up_one_per_step_and_then_it_says_so(task, dots):
+    env = tasks.make(task, num_envs=2)
     env.reset(seed=0)
     env.step(STILL.repeat(2, 1))
     env.reset(seed=[5], env_ids=[1])
-    for _ in range(MAX_DOTS - 1):
+    for _ in range(dots - 1):
         env.step(STILL.repeat(2, 1))
     before = env.get_state_dict()["articulations"]["panda_stick"]
-    with pytest.raises(SimulationError, match=r"environments \[0\] have used up their 300 dots"):
+    with pytest.raises(
+        SimulationError, match=rf"environments \[0\] have used up their {dots} dots"
+    ):
         env.step(torch.ones(2, 7))
     assert torch.equal(env.get_state_dict()["articulations"]["panda_stick"], before)
     env.reset(env_ids=[0])
@@ -32,8 +36,9 @@ def test_the_dots_are_used_up_one_per_step_and_then_it_says_so():
         env.step(STILL.repeat(2, 1))
 
 
-def test_a_low_stick_leaves_a_dot_where_it_is():
-    env = tasks.make("DrawTriangle-v1")
+@pytest.mark.parametrize("task", ["DrawTriangle-v1", "TableTopFreeDraw-v1"])
+def test_a_low_stick_leaves_a_dot_where_it_is(task):
+    env = tasks.make(task)
     env.reset(seed=0)
     steps = 0
     while not drawn(env):

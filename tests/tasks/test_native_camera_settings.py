@@ -28,6 +28,7 @@ EVERYTHING = "rgb+depth+segmentation+position"
 OTHER_PICTURES = {
     "DrawTriangle-v1": "1280 × 960",
     "FMBAssembly1Easy-v1": "1024 × 1024",
+    "TableTopFreeDraw-v1": "1280 × 960",
     "PlugCharger-v1": "rides on the receptacle",
 }
 HALF = math.sqrt(0.5)

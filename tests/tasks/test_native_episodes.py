@@ -16,13 +16,17 @@ pytestmark = NATIVE
 SEEDS = (*range(2, 8), 2**31 - 1, 2**32 - 1)
 # Tasks whose joint noise is not drawn from the stream that goes on without a seed, and why.
 OTHER_NOISE = {
-    "DrawTriangle-v1": "native starts it without joint noise",
     **dict.fromkeys(
         ("PlugCharger-v1", *(f"RotateValveLevel{level}-v1" for level in range(5))),
         "native draws its joint noise from torch's global stream",
     ),
     **dict.fromkeys(
-        ("UnitreeG1PlaceAppleInBowl-v1", "UnitreeG1TransportBox-v1"),
+        (
+            "DrawTriangle-v1",
+            "TableTopFreeDraw-v1",
+            "UnitreeG1PlaceAppleInBowl-v1",
+            "UnitreeG1TransportBox-v1",
+        ),
         "native starts them without joint noise",
     ),
 }

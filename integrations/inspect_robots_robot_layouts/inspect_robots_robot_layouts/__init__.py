@@ -114,7 +114,7 @@ class RobotLayouts:
         data = np.array(action.data, np.float32)
         obs, reward, terminated, truncated, info = self.env.step(data)
         told = info_row(info, self._seed)
-        ended, success = bool(terminated[0]), bool(told["success"])
+        ended, success = bool(terminated[0]), bool(told.get("success", False))
         over = ended or bool(truncated[0])
         return StepResult(
             self._observed(obs),

@@ -90,7 +90,7 @@ class RobotLayouts(StepBenchmark):
         obs, reward, terminated, truncated, info = self._env.step(numbers)
         done, told = bool(terminated[0] or truncated[0]), info_row(info, self._seed)
         self._recorder.record_video(self._frame(obs))
-        success = bool(told["success"])
+        success = bool(told.get("success", False))
         self._recorder.record_step(reward=reward[0].item(), done=done, success=success)
         return StepResult(obs, reward[0].item(), done, told)
 
@@ -102,7 +102,7 @@ class RobotLayouts(StepBenchmark):
     def get_step_result(self, step_result: StepResult) -> EpisodeResult:
         """Return whether the last step was a success, and how far the episode came in stages."""
         told = step_result.info
-        found: EpisodeResult = {"success": bool(told["success"])}
+        found: EpisodeResult = {"success": bool(told.get("success", False))}
         if STAGE_SCORE in told:
             found[STAGE_SCORE] = float(told[STAGE_SCORE])
         return found

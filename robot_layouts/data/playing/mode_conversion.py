@@ -25,6 +25,7 @@ from robot_layouts.simulation import State
 from robots import CONTROL_MODES, JointGroup, TaskError
 from tasks import TaskEnv
 from tasks.driving import DrivenGroup, TcpDrive, VelocityDrive, drive_of, driven_groups
+from tasks.engine import outcome
 from tasks.episode import REBUILT, PlayedEpisode, moments, open_loop
 
 _SETTLING = 10  # steps at the end, while the task is not solved
@@ -214,7 +215,7 @@ def _attempt(
             action, enough = _action(references, task, row)
             found.actions.append(action)
             found.steps.append(row)
-            solved = bool(task.advance(action[None])[-1]["success"][0])
+            solved = bool(outcome.solved(task.advance(action[None])[-1])[0])
             if enough or (solved and schedule.noise):
                 break
         if step < steps:

@@ -41,6 +41,7 @@ from robots import ActionError, DivergedError, TaskError
 from tasks import MultiRobotTask, Scenario, TaskEnv
 from tasks.arrays import row_of, stacked
 from tasks.engine.actions import ActionReader
+from tasks.engine.outcome import solved
 from tasks.episode import REBUILT, PlayedEpisode, Policy, Score, States, StepResult, open_loop
 from tasks.language.stages import STAGE_SCORE
 
@@ -113,11 +114,12 @@ class EpisodePlayer:
         """How its episode went."""
         if self.rehearsed is not None:
             return self.rehearsed.score
-        success = bool(self.moments) and self.moments[-1].success and self.diverged is None
+        last = self.moments[-1] if self.moments else StepResult(None)
+        success = last.success and self.diverged is None
         total = fsum(moment.reward for moment in self.moments)
-        reason = "" if success else str(self.diverged or self.reason)
-        stage = self.moments[-1].stage_score if self.moments else None
-        return Score(success, total, len(self.moments), reason, waits_of(self.policy), stage)
+        reason = "" if success else str(self.diverged or self.reason or last.failure)
+        waits = waits_of(self.policy)
+        return Score(success, total, len(self.moments), reason, waits, last.stage_score)
 
     def episode(
         self, states: States, observations: Any, drawn: dict[str, Any] | None
@@ -295,7 +297,7 @@ def steps_together(env: TaskEnv, players: Sequence[EpisodePlayer]) -> Generator[
             players[0].diverged = error
             return
         seconds = (perf_counter() - began) / len(running)
-        columns = (rewards, info["success"], terminated, truncated)
+        columns = (rewards, solved(info), terminated, truncated)
         rows = list(zip(*(column.tolist() for column in columns), strict=True))
         stages = info[STAGE_SCORE].tolist() if STAGE_SCORE in info else [None] * env.num_envs
         for i in running:

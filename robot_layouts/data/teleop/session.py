@@ -22,6 +22,7 @@ from robot_layouts.data.teleop.steering import Steering
 from robot_layouts.kinematics.rotations import Floats, multiply, quaternion_about
 from robots import RecordingError, TaskError, UnknownNameError
 from tasks import TaskEnv
+from tasks.engine.outcome import solved
 from tasks.episode import REBUILT, PlayedEpisode, Policy, play
 
 SOMEBODY = Actor(PERSON, "browser")
@@ -286,7 +287,7 @@ class Session:
 
     def _do(self, action: NDArray[np.float32]) -> None:
         self.observation, _, _, _, info = self.task.step(action[None])
-        self.success = bool(info["success"])
+        self.success = bool(solved(info))
 
     def _advised(self) -> NDArray[np.float32]:
         """Return what the policy does."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from layouts.visuals import load_meshes
+from objects.files.mesh import convex_hulls
 from objects.joints import Joint
 from objects.shapes import (
     Box,
@@ -157,18 +158,21 @@ class BodyMaker:
 def _solids(shape: Shape) -> Iterator[Shape]:
     """Yield what stands for a shape that collides.
 
-    In MuJoCo, which lets nothing but convex bodies collide, a mesh's pieces stand for its surface.
+    In MuJoCo, which lets nothing but convex bodies collide, convex parts stand for a mesh's
+    surface: its pieces if those are convex, else what CoACD makes of them.
 
     Raises:
         AssetError: If the file of a mesh cannot be read, or is empty or flat, or all its pieces.
+        MissingPackageError: If its surface is hollow and the package coacd is not installed.
     """
     if not isinstance(shape, Mesh) or shape.collision == "hull":
         yield shape
         return
     file = str(shape.path)
     read_corners(file, shape.scale, file, file)  # what cannot be read is refused as a hull is
-    found = pieces(file, shape.scale)
-    if not found:
+    if shape.collision == "surface":
+        found = convex_hulls(file, shape.scale)
+    elif not (found := pieces(file, shape.scale)):
         raise AssetError(f"{file}: no piece of the mesh that hangs together has a volume")
     for corners in found:
         yield _PieceHull(
