@@ -78,6 +78,7 @@ class ThingFromMesh(Protocol):
         friction: Friction | None = None,
         color: Color | None = None,
         most_parts: int = 24,
+        most_grasps: int = 48,
         **fields: Any,
     ) -> ObjectDescriptor:
         """Return a thing that looks as a mesh file says.
@@ -99,6 +100,7 @@ class ThingFromMesh(Protocol):
             color: Colour; None draws it as its file says.
             most_parts: How many convex parts a hollow thing may be taken apart into; 1 takes the
                 convex hull of all, for which CoACD is not needed.
+            most_grasps: How many grasps may be proposed; more than 48 may be nearer to each other.
             **fields: Fields of `ObjectDescriptor` that are known better, such as ``licence``,
                 ``points``, ``rests`` or ``grasps``.
 
@@ -124,6 +126,7 @@ class ThingFromMjcf(Protocol):
         body: str | int | None = None,
         mass: float | None = None,
         folder: str | os.PathLike[str] | None = None,
+        most_grasps: int = 48,
         **fields: Any,
     ) -> ObjectDescriptor:
         """Return a thing that is a body of an MJCF, with all that it carries.
@@ -141,6 +144,7 @@ class ThingFromMjcf(Protocol):
                 takes the only one that is.
             mass: What all of it weighs (kg); None goes by the file.
             folder: A folder whose files may be read, too.
+            most_grasps: As in `from_mesh`; half of them for each joint of a thing with joints.
             **fields: Fields of `ObjectDescriptor` that are known better.
 
         Raises:

@@ -50,13 +50,16 @@ class PackagedObject:
         """Of its files, as SPDX writes it."""
         return load_manifest().package(self.package).origin.licence
 
-    def load(self, seed: int | None = None, *, measured: bool = True) -> ObjectDescriptor:
+    def load(
+        self, seed: int | None = None, *, measured: bool = True, most_grasps: int = 48
+    ) -> ObjectDescriptor:
         """Return it, made of its file, which is fetched if it is not in the local copy.
 
         Args:
             seed: Which of its members; None takes the first.
             measured: Whether its rests and grasps are those that were tried in physics; else they
                 are those that its shape suggests.
+            most_grasps: How many its shape may suggest.
 
         Raises:
             DescriptorError: If a seed is given, and there is one of it alone.
@@ -75,6 +78,7 @@ class PackagedObject:
             "about": self.about,
             "source": f"{origin.wheel}, {file}",
             "licence": origin.licence,
+            "most_grasps": most_grasps,
             **self.details,
         }
         known = measurements().get(self.name) if measured and self.members == 1 else None

@@ -16,7 +16,7 @@ from robots.descriptor import Quaternion
 
 MOST = 48
 WIDEST, NARROWEST = 0.094, 0.003  # m; what fingers that part by 10 cm can be closed on
-POINTS = 300  # on the surface that are tried
+POINTS, MANY = 300, 2400  # on the surface that are tried
 _WAYS = 12  # round each of them, from which the gripper comes
 _OPPOSITE = np.cos(np.radians(12))  # between the two sides that are held
 _SLANTED = np.cos(np.radians(20))  # between each of them and how fingers close, where sides slope
@@ -24,6 +24,7 @@ _GAP = 0.016  # m; where no finger fits between two parts, they are held togethe
 _SHALLOW = 0.006  # m; by which the tips of fingers may seem to be in the table
 _FROM_ABOVE = 0.3  # the sine of how far a gripper may come from below
 _APART = 0.01, np.cos(np.radians(25))  # m, and between ways: grasps nearer than both are one
+_NEAR = 0.004, np.cos(np.radians(12))  # the same, where more than `MOST` are asked for
 _DIGITS = 9
 
 # A hand in its own frame (m): between its tips the origin, z its approach, y as fingers part.
@@ -49,7 +50,7 @@ def proposed(
     lying: Quaternion,
     part: str = "body",
     most: int = MOST,
-    points: int = POINTS,
+    points: int | None = None,
     slanted: bool = False,
 ) -> tuple[Grasp, ...]:
     """Return grasps of some convex shapes, well spread; the same ones each time.
@@ -63,10 +64,13 @@ def proposed(
         centre: Of mass of what is carried, (3,) (m); grasps near to it come first.
         lying: How the thing is turned on its table, wxyz: grippers come from above it.
         part: What is held, as `Grasp.part` has it.
-        most: How many there may be.
-        points: How many on the surface are tried.
+        most: How many there may be; more than `MOST` may be nearer to each other.
+        points: How many on the surface are tried; None tries `POINTS`, or `MANY` where more than
+            `MOST` are asked for.
         slanted: Whether sides may slope, as those of a cone, so that friction has to keep them.
     """
+    many = most > MOST
+    apart, points = _NEAR if many else _APART, points or (MANY if many else POINTS)
     solids = [_solid(shape) for shape in everything if shape.collides]
     own = [_solid(shape) for shape in held if shape.collides]
     up = rotate(np.array(lying) * (1, -1, -1, -1), np.array([0.0, 0.0, 1.0]))
@@ -82,7 +86,7 @@ def proposed(
     for _, middle, frame, width in sorted(tried, key=lambda one: one[0]):
         if 2 * len(chosen) >= most:
             break
-        if any(_alike(middle, frame, *other[:2]) for other in chosen):
+        if any(_alike(middle, frame, *other[:2], apart) for other in chosen):
             continue
         hand = middle + _hand(width) @ frame.T
         deep = (hand @ up).min() < table - _SHALLOW
@@ -96,9 +100,11 @@ def proposed(
     )
 
 
-def _alike(place: Floats, frame: Floats, other: Floats, turned: Floats) -> bool:
+def _alike(
+    place: Floats, frame: Floats, other: Floats, turned: Floats, apart: tuple[float, float]
+) -> bool:
     """Tell whether two grasps are as good as one."""
-    near, alike = _APART
+    near, alike = apart
     return bool(np.linalg.norm(place - other) <= near and frame[:, 2] @ turned[:, 2] >= alike)
 
 

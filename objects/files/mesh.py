@@ -13,7 +13,7 @@ import numpy as np
 from objects.descriptor import ObjectDescriptor
 from objects.family import Made
 from objects.files.convex import MOST_PARTS, convex_parts, hull_volume
-from objects.files.grasps import POINTS, proposed
+from objects.files.grasps import MANY, MOST, proposed
 from objects.files.remembering import Files, remembered
 from objects.files.rests import resting
 from objects.shapes import GREY, Color, ConvexHull, Friction, Mesh, Place, Shape
@@ -35,8 +35,8 @@ _TURNS: dict[str, Quaternion] = {  # from the file's frame to one whose z axis p
     "z": IDENTITY,
 }
 _WATER = 1000.0  # kg/m³
-_MOST = 128  # parts that stand for a surface
-_FEW, _MANY = 20, 8  # grasps, and how many times as many places are tried where there are fewer
+_SURFACE_PARTS = 128  # that stand for a surface
+_FEW = 20  # grasps; where there are fewer, more places are tried
 
 
 def thing_from_mesh(
@@ -50,6 +50,7 @@ def thing_from_mesh(
     friction: Friction | None = None,
     color: Color | None = None,
     most_parts: int = MOST_PARTS,
+    most_grasps: int = MOST,
     **fields: Any,
 ) -> ObjectDescriptor:
     """Return a thing that looks as a mesh file says; see `objects.descriptor.ThingFromMesh`."""
@@ -60,7 +61,8 @@ def thing_from_mesh(
     most = checked_whole("most_parts", most_parts, 1, 256, DescriptorError)
     dense = checked_number("density", density, 1e-3, 1e6, DescriptorError, "kg/m³")
     heavy = None if mass is None else checked_number("mass", mass, 1e-6, 1e4, DescriptorError, "kg")
-    options = file.name, factor, axis, most
+    grasps = checked_whole("most_grasps", most_grasps, 1, 1000, DescriptorError)
+    options = file.name, factor, axis, most, grasps
     made = remembered(_contents(file), options, file.parent, lambda: _made(file, options))
     ratio = dense / _WATER if heavy is None else heavy / mass_of(made.parts).mass
     looks = {"friction": friction, "color": color or GREY}
@@ -93,10 +95,10 @@ def convex_hulls(path: str, scale: Place) -> list[Floats]:
     file = Path(path)
 
     def made() -> tuple[Made, Files]:
-        parts = convex_parts(_mesh(file), _MOST, path, fine=True)
+        parts = convex_parts(_mesh(file), _SURFACE_PARTS, path, fine=True)
         return Made([ConvexHull(corners) for corners in parts]), {}
 
-    hulls = remembered(_contents(file), ("surface", _MOST), None, made).parts
+    hulls = remembered(_contents(file), ("surface", _SURFACE_PARTS), None, made).parts
     return [np.array(hull.corners) * scale for hull in hulls if isinstance(hull, ConvexHull)]
 
 
@@ -106,8 +108,8 @@ def _finished(part: Shape, ratio: float, looks: dict[str, Any], *, textured: boo
     return replace(part, density=part.density * ratio, **looks)
 
 
-def _made(file: Path, options: tuple[str, float, str, int]) -> tuple[Made, Files]:
-    _, scale, up, most = options
+def _made(file: Path, options: tuple[str, float, str, int, int]) -> tuple[Made, Files]:
+    _, scale, up, most, asked = options
     mesh = _mesh(file)
     turn = _TURNS[up]
     mesh.vertices = rotate(np.array(turn), np.asarray(mesh.vertices, float) * scale)
@@ -129,11 +131,11 @@ def _made(file: Path, options: tuple[str, float, str, int]) -> tuple[Made, Files
     centre = mass_of(hulls).centre
     rests = resting([corner for corners in parts for corner in corners], centre)
     lying = next(iter(rests.values()))
-    grasps = proposed(hulls, hulls, centre, lying)
+    grasps = proposed(hulls, hulls, centre, lying, most=asked)
     if len(grasps) < _FEW:
-        grasps = proposed(hulls, hulls, centre, lying, points=_MANY * POINTS)
+        grasps = proposed(hulls, hulls, centre, lying, most=asked, points=MANY)
     if not grasps:
-        grasps = proposed(hulls, hulls, centre, lying, points=_MANY * POINTS, slanted=True)
+        grasps = proposed(hulls, hulls, centre, lying, most=asked, points=MANY, slanted=True)
     return Made([drawn, *hulls], grasps, rests=rests), {}
 
 

@@ -31,7 +31,7 @@ from objects.shapes import (
     Sphere,
 )
 from objects.solids import mass_of, rounded_place, rounded_turn, surface
-from robot_layouts.core.bounds import checked_number
+from robot_layouts.core.bounds import checked_number, checked_whole
 from robot_layouts.core.errors import DescriptorError, UnknownNameError
 from robot_layouts.kinematics.rotations import Floats, multiply, pose_matrix, quaternion_of
 from robots.assets.locator import opened_path
@@ -70,17 +70,19 @@ def thing_from_mjcf(
     body: str | int | None = None,
     mass: float | None = None,
     folder: str | os.PathLike[str] | None = None,
+    most_grasps: int = MOST,
     **fields: Any,
 ) -> ObjectDescriptor:
     """Return a thing that is a body of an MJCF; see `objects.descriptor.ThingFromMjcf`."""
     file = opened_path(path, folder)
     text = read_mjcf(file)
     heavy = None if mass is None else checked_number("mass", mass, 1e-6, 1e4, DescriptorError, "kg")
+    asked = checked_whole("most_grasps", most_grasps, 1, 1000, DescriptorError)
     made = remembered(
         text.digest.encode(),
-        ("mjcf", body),
+        ("mjcf", body, asked),
         None,
-        lambda: _Reading(file, compiled(text, file)[0]).made(body),
+        lambda: _Reading(file, compiled(text, file)[0]).made(body, asked),
     )
     everything = [*made.parts, *(part for joint in made.joints for part in joint.parts)]
     ratio = 1.0 if heavy is None else heavy / mass_of(everything).mass
@@ -112,7 +114,7 @@ class _Reading:
         self._poses: dict[int, Floats] = {}  # of bodies in the thing's frame, by number
         self._parts: list[_Moving] = []
 
-    def made(self, body: str | int | None) -> tuple[Made, Files]:
+    def made(self, body: str | int | None, most_grasps: int) -> tuple[Made, Files]:
         """Return what a body is, and the meshes that are drawn of it."""
         root = self._root(body)
         self._poses[root] = np.eye(4)
@@ -124,7 +126,7 @@ class _Reading:
         joints = [
             self._joint(part, own) for part, own in zip(self._parts[1:], shapes[1:], strict=True)
         ]
-        rests, grasps = _handled(shapes, joints)
+        rests, grasps = _handled(shapes, joints, most_grasps)
         return Made(shapes[0], grasps, self._points(), rests, joints), self._files
 
     def _root(self, body: str | int | None) -> int:
@@ -302,7 +304,7 @@ class _Reading:
 
 
 def _handled(
-    shapes: Sequence[Sequence[Shape]], joints: Sequence[Joint]
+    shapes: Sequence[Sequence[Shape]], joints: Sequence[Joint], most: int
 ) -> tuple[dict[str, Quaternion], list[Grasp]]:
     """Return how a thing rests, and where it is grasped: by its moving parts, if it has some."""
     everything = [shape for own in shapes for shape in own]
@@ -311,11 +313,12 @@ def _handled(
         corners = np.concatenate([surface(shape).corners for shape in solid])
         centre = mass_of(solid).centre
         rests = dict(resting(corners, centre))
-        return rests, list(proposed(solid, solid, centre, next(iter(rests.values()))))
+        lying = next(iter(rests.values()))
+        return rests, list(proposed(solid, solid, centre, lying, most=most))
     grasps = list[Grasp]()
     for joint in joints:
         centre = mass_of(joint.parts).centre
-        grasps += proposed(joint.parts, everything, centre, IDENTITY, joint.name, MOST // 2)
+        grasps += proposed(joint.parts, everything, centre, IDENTITY, joint.name, most // 2)
     return {UPRIGHT: IDENTITY}, grasps
 
 

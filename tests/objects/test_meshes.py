@@ -172,6 +172,7 @@ def test_a_large_hull_keeps_its_shape_with_few_corners(tmp_path):
         ({"mass": -1.0}, "mass is -1"),
         ({"density": "heavy"}, "density is 'heavy'"),
         ({"most_parts": 0}, "most_parts is 0"),
+        ({"most_grasps": 0}, "most_grasps is 0"),
         ({"name": "2 mallets"}, "object name '2 mallets' must be a letter"),
     ],
 )

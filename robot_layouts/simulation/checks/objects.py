@@ -187,7 +187,11 @@ def try_thing_grasps(
         return _shaken(thing, hand, tried, seed)
 
 
-def holding(thing: ObjectDescriptor, openings: Sequence[float] = OPENINGS) -> ObjectDescriptor:
+def holding(
+    thing: ObjectDescriptor,
+    openings: Sequence[float] = OPENINGS,
+    seeds: Sequence[int | None] = (None,),
+) -> ObjectDescriptor:
     """Return a thing with those of its grasps alone that hold it when they are tried.
 
     Each is tried with all hands that open wide enough; see `try_thing_grasps`.
@@ -195,11 +199,17 @@ def holding(thing: ObjectDescriptor, openings: Sequence[float] = OPENINGS) -> Ob
     Args:
         thing: The thing.
         openings: How far the hands open (m).
+        seeds: How each grasp is missed, and the hand shaken, each time that it is tried.
 
     Raises:
         RobotLayoutsError: If it cannot be built.
     """
-    tried = [one for opening in openings for one in try_thing_grasps(thing, opening)]
+    tried = [
+        one
+        for opening in openings
+        for seed in seeds
+        for one in try_thing_grasps(thing, opening, seed=seed)
+    ]
     failed = {one.grasp for one in tried if not one.holds}
     held = {one.grasp for one in tried} - failed
     return replace(thing, grasps=tuple(grasp for grasp in thing.grasps if grasp in held))
