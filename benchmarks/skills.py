@@ -11,6 +11,7 @@ from contextlib import closing
 from functools import cache
 from math import pi
 from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import torch
@@ -46,7 +47,9 @@ from tasks import Area, MultiRobotTask, Object, State, TaskEnv, make, register_t
 from tasks.maths import Array
 
 REACH = 0.855  # m; of a Panda, for which the lengths here hold
-PICKERS = ("panda", "ur5_with_panda", "so101")
+ROBOTIQ = "ur5_with_robotiq"
+PICKERS = ("panda", "ur5_with_panda", ROBOTIQ, "so101")
+EXAMPLE = DOCS.parent / "examples/robotiq.py"
 HANDS = ("panda", "ur5_with_panda")
 OBJECTS = tuple(
     name for name in CATALOGUE if (thing := ObjectRegistry.load(name)).grasps and not thing.joints
@@ -120,6 +123,8 @@ def _played(begin: Begin, seeds: int) -> Iterator[tuple[int, str]]:
 @cache
 def robot_of(name: str) -> RobotDescriptor:
     """Return a robot of the catalogue, or, by ``ARM_with_HAND``, an arm with another's hand."""
+    if name == ROBOTIQ:
+        return run_path(str(EXAMPLE))["UR5_WITH_ROBOTIQ"]
     arm, _, hand = name.partition("_with_")
     robot = RobotRegistry.load(arm)
     return with_gripper(robot, hand) if hand else robot

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,11 +15,19 @@ from robot_layouts.kinematics.rotations import Floats
 from robots.assets.assembled import write_folder
 from robots.guessing.hints import Hints
 from robots.mjcf.couplings import Couplings, find_couplings
-from robots.mjcf.reading import MjcfText, Model, compiled, name_of, read_mjcf
+from robots.mjcf.reading import (
+    MjcfText,
+    Model,
+    compiled,
+    in_radians,
+    name_of,
+    read_mjcf,
+    says_angles,
+)
 from robots.mjcf.robot import HINGE, MjcfRobot, dry_friction, find_drives, find_efforts, find_robot
 from robots.mjcf.to_urdf import excluded, write_urdf
 
-FORM = 1  # of what is made of an MJCF; counted up whenever that changes
+FORM = 2  # of what is made of an MJCF; counted up whenever that changes
 SOURCE = "the MJCF"
 KEPT = 8  # robots that are kept in memory
 
@@ -85,10 +92,13 @@ def locate(path: Path) -> Path:
 def _convert(path: Path, text: MjcfText) -> Converted:
     model, repaired = compiled(text, path)
     robot = find_robot(model, path)
+    if doubts := _doubts(robot, text):
+        model, repaired = compiled(in_radians(text), path)
+        robot = find_robot(model, path)
     couplings = find_couplings(robot, path)
     urdf = write_urdf(robot, couplings, find_efforts(robot), text.name)
     rubbing = dry_friction(robot)
-    notes = [*_doubtful(robot), *repaired, *robot.notes, *couplings.notes, *urdf.notes]
+    notes = [*doubts, *repaired, *robot.notes, *couplings.notes, *urdf.notes]
     if rubbing:
         notes.append(
             f"dry friction of {', '.join(rubbing)} is left out: PhysX has none in N·m or N"
@@ -105,16 +115,17 @@ def _convert(path: Path, text: MjcfText) -> Converted:
     return Converted(text.name, urdf.xml, urdf.meshes, hints, urdf.frames)
 
 
-def _doubtful(robot: MjcfRobot) -> Iterator[str]:
-    """Yield that ranges are those of radians, which were read as degrees, if they look like it."""
+def _doubts(robot: MjcfRobot, text: MjcfText) -> list[str]:
+    """Return that angles are taken for radians, if the ranges look like it and nothing is said."""
     model = robot.model
     hinges = [j for j in robot.moving if model.jnt_type[j] == HINGE and model.jnt_limited[j]]
     widest = max((float(np.ptp(model.jnt_range[joint])) for joint in hinges), default=math.inf)
-    if widest < math.radians(2 * math.pi):
-        yield (
-            f"no hinge turns by more than {math.degrees(widest):.2g}°, so the ranges seem to be in"
-            ' radians, and are read as degrees: write <compiler angle="radian"/> into the MJCF'
-        )
+    if widest >= math.radians(2 * math.pi) or says_angles(text):
+        return []
+    return [
+        f"angles are taken for radians, as no hinge would turn by more than"
+        f' {math.degrees(widest):.2g}° otherwise; <compiler angle="degree"/> in the MJCF keeps them'
+    ]
 
 
 def _postures(model: Model, robot: MjcfRobot, couplings: Couplings) -> dict[str, dict[str, float]]:

@@ -13,10 +13,10 @@ import re
 import warnings
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, tostring
+from xml.etree.ElementTree import Element, fromstring, tostring
 
 import numpy as np
 
@@ -87,6 +87,18 @@ def read_mjcf(path: Path) -> MjcfText:
             package, or there are too many; or if it has elements that make no robot.
     """
     return _MjcfReading(path).text()
+
+
+def says_angles(text: MjcfText) -> bool:
+    """Tell whether an MJCF says in which unit its angles are."""
+    return any(each.get("angle") for each in fromstring(text.xml).iter("compiler"))
+
+
+def in_radians(text: MjcfText) -> MjcfText:
+    """Return an MJCF with its angles, which are in degrees if it does not say so, in radians."""
+    root = fromstring(text.xml)
+    root.insert(0, Element("compiler", angle="radian"))
+    return replace(text, xml=tostring(root, encoding="unicode"))
 
 
 def files_of(path: Path) -> tuple[Path, ...]:

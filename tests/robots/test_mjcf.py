@@ -99,11 +99,18 @@ class TestWhatIsGuessed:
         path = write(tmp_path, mjcf(arm(inside='<freejoint name="fly"/>')))
         assert "'fly', by which the whole robot flies freely, is fixed" in reasons(path)
 
-    def test_ranges_of_radians_that_are_read_as_degrees_are_doubted(self, tmp_path):
-        tiny = arm().replace('range="-100 100"', 'range="-1.7 1.7"')
-        about = reasons(write(tmp_path, mjcf(tiny)))
-        assert "no hinge turns by more than 3.4°, so the ranges seem to be in radians" in about
-        assert "seem to be in radians" not in reasons(write(tmp_path, mjcf(arm())))
+    def test_ranges_of_radians_are_taken_for_that_unless_the_file_says_degrees(self, tmp_path):
+        small = mjcf(arm().replace('range="-100 100"', 'range="-1.7 1.7"'))
+        path = write(tmp_path, small)
+        assert "taken for radians, as no hinge would turn by more than 3.4° otherwise" in reasons(
+            path
+        )
+        assert {(joint.lower, joint.upper) for joint in urdf_of(path).moving} == {(-1.7, 1.7)}
+        said = write(
+            tmp_path, small.replace("<worldbody>", '<compiler angle="degree"/><worldbody>')
+        )
+        for file in (said, write(tmp_path, mjcf(arm()))):
+            assert "radians" not in reasons(file)
 
     @pytest.mark.parametrize(
         ("lid", "use", "what"),
