@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
-from functools import cache
+from functools import cache, partial
 from math import pi
 from pathlib import Path
 from runpy import run_path
@@ -102,7 +102,7 @@ Begin = Callable[[], tuple[TaskEnv, Callable[[Scene], list[Script]]]]
 def _cases() -> Iterator[tuple[str, str, Begin]]:
     for robot in PICKERS:
         for name in OBJECTS:
-            yield robot, name, _Picking(robot, name).begin
+            yield robot, name, partial(_picked, robot, name)
     for name in HANDED:
         yield "hand over", name, _Both("hand over", name).begin
     for name in TOGETHER:
@@ -128,6 +128,10 @@ def robot_of(name: str) -> RobotDescriptor:
     arm, _, hand = name.partition("_with_")
     robot = RobotRegistry.load(arm)
     return with_gripper(robot, hand) if hand else robot
+
+
+def _picked(robot: str, name: str) -> tuple[TaskEnv, Callable[[Scene], list[Script]]]:
+    return _Picking(robot, name).begin()
 
 
 class _Picking:
