@@ -1,7 +1,8 @@
 """``python -m benchmarks skills``: how often skills of experts succeed, by robots and objects.
 
 Each object that can be grasped is picked by arms that differ, twenty are handed over between two
-of them, and five are lifted together by two unlike ones.
+of them, and five are lifted together by two unlike ones. Files of one gripper are robosuite's:
+``pip install --no-deps robosuite==1.5.2``.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from layouts import Layout, Placement, at_task
+from layouts.frames import ORIGIN
 from layouts.placement import RobotLike, load_robot
 from layouts.standing import held_widths, needed_reaches
 from robot_layouts.core.bounds import shown
@@ -281,8 +282,9 @@ def make(
         num_envs: Number of environments in this process.
         robots: Other robots for some places: a mapping place → robot, or one robot for all of
             them; by name, descriptor, the path of a URDF or MJCF to guess it from, or
-            ``MODULE:NAME``. They stand at the layout's places, or, in a task that fits its robots,
-            where `layouts.at_task` puts them. One that lacks its place's keyframe starts from its
+            ``MODULE:NAME``. They stand at the layout's places, or, in a task that fits its robots
+            and where neither the layout nor the robot says a place, where `layouts.at_task` puts
+            them. One that lacks its place's keyframe starts from its
             home's. One robot of several limbs serves all places, as `layouts.at_task` puts it.
         layout: Another layout with the task's places, in any order; for a task over any number of
             robots, with places of any names. ``bystanders="hold"`` or ``"act"`` lets more robots
@@ -407,6 +409,11 @@ def _replace_robots(
             held, needed = held_widths(cls, layout), needed_reaches(cls, layout)
             return at_task(robots, layout, holding=held, needed=needed)
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
+        lost = {place: at.robot for place, at in changed.items() if _lacks_a_place(at)}
+        if lost:
+            held, needed = held_widths(cls, layout), needed_reaches(cls, layout)
+            placed = at_task(lost, layout, holding=held, needed=needed)
+            changed |= {place: placed[place] for place in lost}
         return Layout({**layout, **changed}, layout.frames)
     if isinstance(robots, (str, PathLike, RobotDescriptor)):
         if (robot := load_robot(robots)).limbs:
@@ -440,6 +447,12 @@ def _stand(placement: Placement, robot: RobotLike) -> Placement:
     if placement.keyframe not in robot.keyframes:
         placement = replace(placement, keyframe=None)
     return placement.with_robot(robot)
+
+
+def _lacks_a_place(placement: Placement) -> bool:
+    """Tell whether a robot would stand in the world's origin, on what it is to work at."""
+    says = placement.position is not None or placement.on is not None
+    return not says and placement.base_position == ORIGIN
 
 
 def _is_native_name(name: str) -> bool:

@@ -9,12 +9,12 @@ import torch
 from torch import Tensor
 
 import tasks
-from layouts import single
+from layouts import Layout, Placement, single
 from robot_layouts.simulation import Friction, PhysicsSettings, State, World
 from robot_layouts.simulation.sapien3.backend import worlds_below
 from robots import UnknownNameError
 from tasks.engine.scenario import ScenarioFields
-from tasks.registry import TASKS
+from tasks.registry import TASKS, make_scenario
 
 SHORT = {"FMBAssembly1Easy-v1": "fmb_assembly"}  # names that do not follow from the id
 
@@ -149,3 +149,16 @@ def test_type_checkers_know_every_keyword():
     named = set(inspect.signature(tasks.make).parameters) - {"task_id", "robots", "fields"}
     fields = {field.name for field in dataclasses.fields(tasks.Scenario)}
     assert named | set(ScenarioFields.__annotations__) == fields
+
+
+def test_a_robot_without_a_place_of_its_own_stands_where_it_reaches():
+    """At the origin it would stand on the cube."""
+    for name, nearest in (("ur5", -0.8), ("ur10", -1.1), ("panda", -0.615)):
+        layout = make_scenario(tasks.get_task_class("PickCube-v1"), robots={"arm": name}).layout
+        x, y, z = layout["arm"].base_position
+        assert nearest <= x <= nearest + 0.15
+        assert (y, z) == (0.0, 0.0)
+    there = Layout({"arm": Placement("ur5", position=(0.0, 0.0, 0.0))})
+    assert make_scenario(tasks.get_task_class("PickCube-v1"), layout=there).layout[
+        "arm"
+    ].base_position == (0.0, 0.0, 0.0)
