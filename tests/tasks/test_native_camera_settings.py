@@ -30,6 +30,8 @@ OTHER_PICTURES = {
     "FMBAssembly1Easy-v1": "1024 × 1024",
     "TableTopFreeDraw-v1": "1280 × 960",
     "PlugCharger-v1": "rides on the receptacle",
+    "UnitreeG1PlaceAppleInBowl-v1": "sees 90°",
+    "UnitreeG1TransportBox-v1": "sees 60°",
 }
 HALF = math.sqrt(0.5)
 ROLLED = [0.5, 0.3, 0.6, 0.16, 0.386, -0.134, -0.899]  # looks at the cube, and is rolled
