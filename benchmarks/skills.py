@@ -103,7 +103,7 @@ Begin = Callable[[], tuple[TaskEnv, Callable[[Scene], list[Script]]]]
 def _cases() -> Iterator[tuple[str, str, Begin]]:
     for robot in PICKERS:
         for name in OBJECTS:
-            yield robot, name, partial(_picked, robot, name)
+            yield robot, name, partial(_begun, robot, name)
     for name in HANDED:
         yield "hand over", name, _Both("hand over", name).begin
     for name in TOGETHER:
@@ -131,7 +131,7 @@ def robot_of(name: str) -> RobotDescriptor:
     return with_gripper(robot, hand) if hand else robot
 
 
-def _picked(robot: str, name: str) -> tuple[TaskEnv, Callable[[Scene], list[Script]]]:
+def _begun(robot: str, name: str) -> tuple[TaskEnv, Callable[[Scene], list[Script]]]:
     return _Picking(robot, name).begin()
 
 

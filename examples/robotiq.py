@@ -10,7 +10,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
-from robots import ActionSplit, AssetError, Fingers, JointGroup, RobotDescriptor
+from robots import ActionSplit, AssetError, Fingers, JointGroup, RobotDescriptor, RobotRegistry
 from robots.grafting import with_gripper
 
 SIDES = "left", "right"
@@ -48,13 +48,13 @@ def robotiq_140() -> RobotDescriptor:
         guess,
         action_split=ActionSplit(gripper=LINKAGE),
         fingers=Fingers(
-            ("left_inner_finger", "right_inner_finger"), (1, 1), opening_axes=((0, 0, 1),) * 2
+            ("left_inner_finger", "right_inner_finger"), (1, 1), opening_axes=((0, 0, 1), (0, 0, 1))
         ),
         tcp_link="grip_site",
         tcp_offset=(0.0, 0.0, 0.025),  # near the ends of the pads
         keyframes={"rest": (0.0,) * 6},
-        allowed_collisions=tuple(dict.fromkeys((*guess.allowed_collisions, *crossing))),
+        allowed_collisions=tuple(dict.fromkeys((*(guess.allowed_collisions or ()), *crossing))),
     )
 
 
-UR5_WITH_ROBOTIQ = with_gripper("ur5", robotiq_140())
+UR5_WITH_ROBOTIQ = with_gripper(RobotRegistry.load("ur5"), robotiq_140())
