@@ -139,9 +139,8 @@ def _is_convex(corners: Floats, triangles: NDArray[np.intp]) -> bool:
 
 
 def _taken_apart(mesh: Any, most: int, where: str, settings: Mapping[str, Any]) -> list[Floats]:
-    what = (
-        f"{where} is hollow; taking it apart needs CoACD (its convex hull does not: most_parts=1)"
-    )
+    otherwise = "" if settings is _FINE else " (its convex hull does not: most_parts=1)"
+    what = f"{where} is hollow; taking it apart needs CoACD{otherwise}"
     coacd = optional("coacd", what, "objects")
     print(f"taking {where} apart into convex parts, once; it may take a minute", file=sys.stderr)
     coacd.set_log_level("error")

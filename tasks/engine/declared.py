@@ -187,6 +187,7 @@ def _check_attributes(cls: type[Task]) -> None:
     check_stages(task, cls.stages)
     checked_whole(f"{task}.max_episode_steps", cls.max_episode_steps, 1, _STEPS, TaskError)
     checked_number(f"{task}.max_reward", cls.max_reward, 1e-6, 1e6, TaskError)
+    checked_number(f"{task}.control_frequency", cls.control_frequency, 0.1, 1e5, TaskError, "Hz")
     checked_whole(f"{task}.first_seed", cls.first_seed, 0, 2**32 - 1, TaskError)
     checked_flag(f"{task}.rebuilds", cls.rebuilds, TaskError)
     checked_flag(f"{task}.double_rewards", cls.double_rewards, TaskError)

@@ -67,7 +67,10 @@ class _FreshScenario:
     def __get__(self, instance: object, owner: type[MultiRobotTask]) -> Scenario:
         """Return it; a task that is being run has its own as an attribute."""
         return Scenario(
-            layout=owner.layout, physics=owner.physics, randomization=owner.randomization
+            layout=owner.layout,
+            physics=owner.physics,
+            control_frequency=owner.control_frequency,
+            randomization=owner.randomization,
         )
 
 

@@ -96,6 +96,7 @@ class Task:
             of robots goes by its layout instead.
         fit: In methods, how they do: `tasks.Fit`.
         physics: Solver settings; None keeps SAPIEN's own defaults.
+        control_frequency: Control steps per second, unless a scenario says otherwise (Hz).
         randomization: What varies from episode to episode; None for nothing.
         max_episode_steps: Control steps until an episode is truncated.
         open_ended: Whether nothing counts as success, so that `evaluate` returns none.
@@ -148,6 +149,7 @@ class Task:
     fits_robots: ClassVar[bool] = False
     fit: Fit = AS_DECLARED
     physics: ClassVar[PhysicsSettings | None] = None
+    control_frequency: ClassVar[float] = 20.0
     randomization: ClassVar[Randomization | None] = None
     max_episode_steps: int
     open_ended: ClassVar[bool] = False

@@ -21,6 +21,13 @@ DOWN[1] = 0.5
 UP[1], UP[3] = -0.5, 0.5
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _registered():
+    """Not before other tests have listed all tasks."""
+    tasks.register_task("KeepAway-v1")(KeepAway)
+    tasks.register_task("Doodle-v1")(Doodle)
+
+
 def lowers(obs):
     return DOWN
 
@@ -122,6 +129,14 @@ def test_lerobots_interface_takes_it():
 
 def test_what_nothing_solves_is_recorded_and_played_again(tmp_path, capsys):
     record("Doodle-v1", range(2), tmp_path, policy=raises, workers=0)
-    task = f"{Doodle.__module__}:Doodle-v1"
-    assert main(["replay", str(tmp_path / "trajectory.h5"), "--workers", "0", "--task", task]) == 0
+    assert main(["replay", str(tmp_path / "trajectory.h5"), "--workers", "0"]) == 0
     assert "2 of 2" in capsys.readouterr().out
+
+
+def test_a_class_says_how_often_a_second_it_is_controlled():
+    seconds = {}
+    for frequency in ({}, {"control_frequency": 50}):
+        with closing(tasks.make("Doodle-v1", **frequency)) as env:
+            seconds[env.scenario.control_frequency] = env.simulation.substeps
+    assert seconds == {10: 10, 50: 2}
+    assert tasks.make("KeepAway-v1").scenario.control_frequency == 20
