@@ -21,7 +21,6 @@ GAP, OVER = 0.09, 0.1  # of tips before the box's sides, and higher than where t
 HELD = 0.085  # m; height of the tips when they press: hands stay above the box
 LEGS, RAISED = 5, HIGH + 0.04  # in how many steps it is lifted, and how far (m)
 TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))  # how deep tips press (m), and strokes of the push
-SHORT = np.array([0.0, 0.02, 0.0])  # of the box, where the push aims, which goes too far (m)
 
 
 def squeeze_box(task: TaskEnv, seed: int) -> Plan:
@@ -42,7 +41,7 @@ def _script(task: TaskEnv, deep: float, strokes: int) -> Script:
     start: list[Floats] = []  # where the box stood
 
     def under(scene: Scene) -> Floats:
-        return scene.body("box")[0] - SHORT
+        return scene.body("box")[0]
 
     pushing = push(
         task, "pusher", "plinth", under, strokes=strokes, gap=0.2, after=[f"west.up {LEGS - 1}"]
