@@ -45,7 +45,7 @@ from tasks.engine.divergence import (
     refuse_state,
 )
 from tasks.engine.observation import Observer, read_mode, space_of
-from tasks.engine.outcome import ELAPSED
+from tasks.engine.outcome import ELAPSED, FAILED, SOLVED
 from tasks.engine.pictures import tiled
 from tasks.engine.places import built_layout, fitted, is_tested, refuse_collisions
 from tasks.engine.remade import Remade
@@ -393,7 +393,8 @@ class TaskEnv(Remade):
         obs = self._observation(state, info, moving)
         reward = self._reward(state, flat, info)
         truncated = self._elapsed >= self.task.max_episode_steps
-        return obs, reward, outcome.ended(info), truncated, info
+        ended = info[SOLVED].copy() if self._only_succeeds else outcome.ended(info)
+        return obs, reward, ended, truncated, info
 
     def trust(self, actions: Floats) -> None:
         """Take what is in this very array, (N, A), as actions that were checked before."""
@@ -578,6 +579,7 @@ class TaskEnv(Remade):
         state, mode, name = self._read(), self.observer.mode, self.task_class.__name__
         with unchanged(state, f"{name}.evaluate()"):
             info = self._info(state)
+        self._only_succeeds = SOLVED in info and FAILED not in info  # as nearly all tasks
         with unchanged(state, f"{name}.observe()"):
             parts = {} if mode.nothing else self._observed.checked(self.task.observe(state, info))
         if self._feels and not mode.nothing:
