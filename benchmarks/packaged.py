@@ -21,7 +21,7 @@ from robot_layouts.simulation.checks.objects import holding, try_rests
 
 DIGITS = 6
 MISSES = 11, 12  # seeds, not those by which `benchmarks objects` tries them again
-ENOUGH, MANY = 20, 640  # grasps that hold, and as many as are tried where fewer do
+ENOUGH, MANY = 20, 1000  # grasps that hold, and as many as are tried where fewer do
 SINGLE = tuple(name for name, one in PACKAGED.items() if one.members == 1)
 
 
