@@ -17,7 +17,7 @@ from objects.files.grasps import MANY, MOST, proposed
 from objects.files.remembering import Files, remembered
 from objects.files.rests import resting
 from objects.shapes import GREY, Color, ConvexHull, Friction, Mesh, Place, Shape
-from objects.solids import mass_of
+from objects.solids import has_volume, mass_of
 from robot_layouts.core.bounds import checked_choice, checked_number, checked_whole
 from robot_layouts.core.errors import AssetError, DescriptorError, UnreadableFileError
 from robot_layouts.core.files import read_regular
@@ -95,8 +95,14 @@ def convex_hulls(path: str, scale: Place) -> list[Floats]:
     file = Path(path)
 
     def made() -> tuple[Made, Files]:
-        parts = convex_parts(_mesh(file), _SURFACE_PARTS, path, fine=True)
-        return Made([ConvexHull(corners) for corners in parts]), {}
+        mesh = _mesh(file)
+        solid = [p for p in mesh.split(only_watertight=False) if has_volume(np.array(p.vertices))]
+        parts = [
+            ConvexHull(corners)
+            for piece in solid or [mesh]
+            for corners in convex_parts(piece, _SURFACE_PARTS, path, fine=True)
+        ]
+        return Made(parts), {}
 
     hulls = remembered(_contents(file), ("surface", _SURFACE_PARTS), None, made).parts
     return [np.array(hull.corners) * scale for hull in hulls if isinstance(hull, ConvexHull)]
