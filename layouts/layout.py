@@ -211,12 +211,13 @@ class Layout(Arrangement):
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If usd-core or scipy is not installed.
         """
-        from layouts.export.files import expect_ending
+        from layouts.export.cell import ExportedCell
+        from layouts.export.files import USD_ENDINGS, expect_ending
 
-        target = expect_ending(path, "a USD stage", ".usd", ".usda", ".usdc")
+        target = expect_ending(path, "a USD stage", *USD_ENDINGS)
         from layouts.export.usd import write_usd  # which needs usd-core
 
-        return write_usd(self, target, visuals=visuals)
+        return write_usd(ExportedCell.read(self, visuals=visuals), target, visuals=visuals)
 
     def to_ros2(self, folder: str | PathLike[str], *, visuals: bool = True) -> Path:
         """Save the layout as a ROS 2 package for MoveIt and ros2_control, meshes included.
@@ -243,9 +244,10 @@ class Layout(Arrangement):
             DescriptorError: If a descriptor contradicts its URDF.
             MissingPackageError: If scipy is not installed.
         """
+        from layouts.export.cell import ExportedCell
         from layouts.export.ros2 import write_ros2
 
-        return write_ros2(self, folder, visuals=visuals)
+        return write_ros2(ExportedCell.read(self, visuals=visuals), folder, visuals=visuals)
 
     def preview(
         self,

@@ -200,3 +200,22 @@ def _own_colour(mesh: Any) -> Rgba | None:
         return None
     red, green, blue, alpha = (np.asarray(material.main_color, float) / 255).tolist()
     return (red, green, blue, alpha)
+
+
+def mean_color(mesh: Any) -> Rgba:
+    """Return the mean colour of the texture of a trimesh, or else its material's main colour."""
+    material = getattr(mesh.visual, "material", None)
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    if image is not None:
+        pixels = np.asarray(image.convert("RGB")).reshape(-1, 3)
+        red, green, blue = (pixels.mean(0) / 255).tolist()
+        return red, green, blue, 1.0
+    main = getattr(material, "main_color", (180, 180, 180, 255))
+    red, green, blue, alpha = (np.asarray(main, float) / 255).tolist()
+    return red, green, blue, alpha
+
+
+def shown_color(color: Rgba) -> Rgba:
+    """Return a colour of light, which is linear, as screens encode it."""
+    red, green, blue = (np.array(color[:3]) ** (1 / 2.2)).tolist()
+    return red, green, blue, color[3]

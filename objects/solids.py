@@ -93,6 +93,24 @@ def mass_of(shapes: Iterable[Shape]) -> MassProperties:
     return MassProperties(volume, mass, moment / mass)
 
 
+def inertia_of(shapes: Iterable[Shape], centre: Floats) -> Floats:
+    """Return the inertia of shapes that collide, along the body's axes, (3, 3) (kg·m²).
+
+    Args:
+        shapes: In the body's frame.
+        centre: Point of that frame about which it is, (3,) (m).
+    """
+    whole = np.zeros((3, 3))
+    for shape in shapes:
+        if shape.collides:
+            volume, middle = _volume(shape)
+            mass, turn = volume * shape.density, _pose(shape)[:3, :3]
+            away = transform(_pose(shape), middle) - centre
+            whole += turn @ _inertia(shape, mass) @ turn.T
+            whole += mass * (away @ away * np.eye(3) - np.outer(away, away))
+    return whole
+
+
 def reach(shapes: Iterable[Shape], way: Floats) -> float:
     """Return how far shapes that collide reach in a direction, from the body's origin (m).
 
@@ -289,6 +307,26 @@ def _volume(shape: Shape) -> tuple[float, Floats]:
             volumes = np.einsum("ij,ij->i", one, np.cross(two, three)) / 6
             centres = (one + two + three) / 4
             return float(volumes.sum()), volumes @ centres / volumes.sum()
+
+
+def _inertia(shape: Shape, mass: float) -> Floats:
+    """Return the inertia of a shape about its centre in its own frame, (3, 3) (kg·m²)."""
+    import trimesh
+
+    match shape:
+        case Sphere(radius=r):
+            return np.eye(3) * mass * 2 / 5 * r**2
+        case Cylinder(radius=r, half_length=h):
+            across = mass * (r**2 / 4 + h**2 / 3)
+            return np.diag([mass * r**2 / 2, across, across])
+        case Capsule(radius=r, half_length=h):
+            ends = mass * 4 * r / (6 * h + 4 * r)  # both, which are a ball together
+            rod = mass - ends
+            across = rod * (r**2 / 4 + h**2 / 3) + ends * (2 / 5 * r**2 + h**2 + 3 / 4 * h * r)
+            return np.diag([rod * r**2 / 2 + ends * 2 / 5 * r**2, across, across])
+        case _:
+            found = trimesh.Trimesh(*_surface(shape), process=False)
+            return np.asarray(found.moment_inertia) * mass / found.volume
 
 
 def _reach(shape: Shape, way: Floats) -> float:

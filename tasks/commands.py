@@ -25,6 +25,7 @@ from tasks.description import (
 from tasks.registry import list_tasks, load_tasks, make
 from tasks.view import task_cell
 
+FORMATS = ("mjcf", "usd", "ros2")
 MIN_WIDTH = 156  # columns that a table may take; a narrower terminal wraps it
 LEGEND = (
     "norm is normalized_dense; the first reward mode is the default. parity: the last recorded"
@@ -138,14 +139,17 @@ def export(
     task: str,
     *,
     out: Annotated[str, Word("PATH")],
+    format: Annotated[str, Word(choices=FORMATS)] = "mjcf",
     seed: int = 0,
     cell: CellOptions,
 ) -> None:
-    """Write a task's world, as an episode begins, as an MJCF model for MuJoCo.
+    """Write a task's world, as an episode begins, for other programs.
 
     Args:
         task: Task id or another of its names; MODULE:ID for one of your own.
-        out: The model (.xml); meshes of robots go into a folder beside it.
+        out: A model for MuJoCo (.xml; meshes go into a folder beside it), a USD stage (.usd, .usda,
+            .usdc), or the folder of a ROS 2 package.
+        format: What to write.
         seed: Which episode.
         cell: Its robots, and what varies.
 
@@ -154,7 +158,7 @@ def export(
     """
     with closing(make(task, **cell.making())) as env:
         env.reset(seed)
-        print(f"model: {env.to_mjcf(out)}")
+        print(f"{format}: {getattr(env, f'to_{format}')(out)}")
 
 
 def _console() -> Console:

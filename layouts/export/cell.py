@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -18,6 +19,7 @@ from robot_layouts.core.commands import notice
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, transform
 from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
+from robots.descriptor import Vector3
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel
 from robots.urdf.reading import model_of
 from robots.urdf.summary import root_of
@@ -25,6 +27,12 @@ from robots.urdf.tcp import find_tcp
 from robots.urdf.text import numbers_of
 from robots.urdf.tree import kinematic_tree
 
+if TYPE_CHECKING:
+    from layouts.export.bodies import ExportedBody
+    from objects import ObjectDescriptor
+
+EARTH: Vector3 = (0.0, 0.0, -9.81)  # m/s²
+BODIES = "bodies"  # what the files of a task's bodies are called, and no robot's
 SMALLEST_INERTIA = 1e-6  # kg, kg·m²; of links that move and have none, as SAPIEN takes it
 
 
@@ -139,13 +147,15 @@ class Standing:
 
     Attributes:
         place: The place's name.
-        placement: Where it stands, and how it starts.
+        placement: Where it stands.
         source: Its description.
+        start: Positions of its joints, in the descriptor's order (rad, m).
     """
 
     place: str
     placement: Placement
     source: RobotSource
+    start: Sequence[float]
 
     @cached_property
     def base(self) -> Floats:
@@ -154,9 +164,9 @@ class Standing:
 
     @cached_property
     def home(self) -> dict[str, float]:
-        """Position of every joint that moves where the layout starts the robot (rad, m)."""
+        """Position of every joint that moves at the start (rad, m)."""
         robot, model = self.placement.robot, self.source.model
-        home = dict(zip(robot.joints, self.placement.start_qpos, strict=True))
+        home = dict(zip(robot.joints, self.start, strict=True))
         waiting = list(self.source.followers)
         while waiting:
             joint = waiting.pop(0)
@@ -199,19 +209,33 @@ class ExportedCell:
     Attributes:
         layout: The layout.
         robots: The robots, by place.
+        gravity: Acceleration (m/s²).
+        bodies: What else there is, of a task's world.
+        things: What some of those are made after.
     """
 
     layout: Arrangement
     robots: Mapping[str, Standing]
+    gravity: Vector3 = EARTH
+    bodies: tuple[ExportedBody, ...] = ()
+    things: tuple[ObjectDescriptor, ...] = ()
 
     @classmethod
-    def read(cls, layout: Arrangement, *, visuals: bool) -> ExportedCell:
+    def read(
+        cls,
+        layout: Arrangement,
+        *,
+        visuals: bool,
+        starts: Mapping[str, Sequence[float]] | None = None,
+    ) -> ExportedCell:
         """Read the robots' files.
 
         Args:
             layout: The layout.
             visuals: Whether the files that only pictures need are wanted, too. A robot without
                 them is drawn by its collision shapes; a notice says so.
+            starts: Where robots are, by place, in the order of their joints (rad, m); None is
+                where the layout starts them.
 
         Raises:
             AssetError: If a robot's files cannot be found or are invalid.
@@ -219,12 +243,18 @@ class ExportedCell:
         """
         sources: dict[RobotDescriptor, RobotSource] = {}
         names = Names()
+        names.new(BODIES)
         for placement in layout.values():
             robot = placement.robot
             if robot not in sources:
                 name = names.new(robot.name)
                 sources[robot] = _source(robot, name, visuals=visuals)
-        return cls(layout, {n: Standing(n, p, sources[p.robot]) for n, p in layout.items()})
+        robots = {
+            name: Standing(name, placement, sources[placement.robot], start)
+            for name, placement in layout.items()
+            for start in [placement.start_qpos if starts is None else starts[name]]
+        }
+        return cls(layout, robots)
 
     @property
     def sources(self) -> tuple[RobotSource, ...]:

@@ -16,6 +16,7 @@ from robots.assets.assembled import AssembledUrdf
 from robots.assets.manifest import load_manifest
 from robots.descriptor import UrdfSource
 
+USD_ENDINGS = (".usd", ".usda", ".usdc")
 LICENCES = "LICENCES.md"  # a note on those of robot files
 
 

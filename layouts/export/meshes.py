@@ -41,12 +41,14 @@ class CollisionShape:
 
     Attributes:
         shape: The shape of the URDF.
-        hull: Its convex hull in the link's frame, a trimesh (m); None for a shape that the format
+        mesh: Its convex hull in the link's frame, a trimesh (m); None for a shape that the format
             has itself.
+        convex: Whether it is that; else the mesh is the very surface that collides.
     """
 
     shape: UrdfShape
-    hull: Any
+    mesh: Any
+    convex: bool = True
 
 
 def drawn_meshes(source: RobotSource, *, visuals: bool) -> dict[str, tuple[Drawn, ...]]:
@@ -66,7 +68,7 @@ def drawn_meshes(source: RobotSource, *, visuals: bool) -> dict[str, tuple[Drawn
         return {}
     if not source.drawn:
         solids = solid_shapes(source, hulls=tuple(SIZES))
-        return {link: tuple(Drawn(s.hull, GREY) for s in some) for link, some in solids.items()}
+        return {link: tuple(Drawn(s.mesh, GREY) for s in some) for link, some in solids.items()}
     parts = read_visuals(source.urdf)
     coarse = {link: map(simplified, of_link) for link, of_link in parts.items()}
     return {

@@ -123,9 +123,9 @@ class MjcfModel:
         for link, solids in solid_shapes(source, HULLS).items():
             for solid in solids:
                 name = ""
-                if solid.hull is not None:
-                    file = files.save(solid.hull, f"{link}_collision")
-                    inertia = "convex" if solid.hull.volume > LEAST_VOLUME else "shell"
+                if solid.mesh is not None:
+                    file = files.save(solid.mesh, f"{link}_collision")
+                    inertia = "convex" if solid.mesh.volume > LEAST_VOLUME else "shell"
                     name = self._add_mesh(f"{source.name}/{file}", inertia)
                 geoms[link].append(_solid(solid, name, source.friction_of(link)))
         self._shapes[id(source)] = geoms

@@ -7,26 +7,28 @@ from __future__ import annotations
 
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from layouts.export.cell import ExportedCell, RobotSource, Standing
+from layouts.export.bodies import PLANE, BodyLink, BodyShape, ExportedBody
+from layouts.export.cell import EARTH, ExportedCell, JointDrive, RobotSource, Standing
 from layouts.export.files import Names, licence_note
 from layouts.export.meshes import CollisionShape, Drawn, drawn_meshes, solid_shapes
+from objects.shapes import Friction
 from robot_layouts.core.importing import optional
 from robot_layouts.core.writing import PARTIAL, written_whole
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of
 from robots import CameraMount, GripperMaterial
+from robots.descriptor import Vector3
 from robots.urdf.model import LinkInertia, ModelJoint
-
-if TYPE_CHECKING:
-    from layouts.arrangement import Arrangement
 
 FORBIDDEN = r"[^A-Za-z0-9_]"
 # From a camera that looks along +x, z up, to USD's, which looks along -z, y up (wxyz).
 LOOKING = (0.5, 0.5, -0.5, -0.5)
+ORIGIN = np.zeros(3)
 APERTURE = 20.955  # of USD's cameras, unless they say otherwise; tenths of a unit
 
 
@@ -38,15 +40,17 @@ Gf, Sdf, Usd, UsdGeom = map(_pxr, ("Gf", "Sdf", "Usd", "UsdGeom"))
 UsdPhysics, UsdShade, Vt = map(_pxr, ("UsdPhysics", "UsdShade", "Vt"))
 
 
-def write_usd(layout: Arrangement, target: Path, *, visuals: bool = True) -> Path:
-    """Write a layout as a USD stage; see `layouts.Layout.to_usd`."""
-    cell = ExportedCell.read(layout, visuals=visuals)
+def write_usd(cell: ExportedCell, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
+    """Write a cell as a USD stage; see `layouts.Layout.to_usd` and `tasks.TaskEnv.to_usd`."""
+    target = Path(path)
     stage = _Stage(cell, _identifier(target.stem))
     for source in cell.sources:
         stage.add_shapes(source, visuals=visuals)
     stage.add_surroundings()
     for standing in cell.robots.values():
         stage.add_robot(standing)
+    for body in cell.bodies:
+        stage.add_body(body)
     partial = target.with_name(f"{target.stem}.{os.getpid()}{PARTIAL}{target.suffix}")
     with written_whole(target, partial=partial):
         stage.save(partial)
@@ -82,13 +86,15 @@ class _Stage:
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.z)
         UsdGeom.SetStageMetersPerUnit(self._stage, 1.0)
         UsdPhysics.SetStageKilogramsPerUnit(self._stage, 1.0)
-        note = licence_note(source.robot for source in cell.sources)
+        note = licence_note((source.robot for source in cell.sources), cell.things)
         self._stage.GetRootLayer().documentation = note
         self._stage.SetMetadata("comment", "lengths in m, z up; see the documentation for licences")
         root = UsdGeom.Xform.Define(self._stage, f"/{name}").GetPrim()
         self._stage.SetDefaultPrim(root)
-        self._paths = _Paths(f"/{name}", "scene", "tables", "frames", "surfaces")
-        UsdPhysics.Scene.Define(self._stage, f"/{name}/scene")
+        self._paths = _Paths(f"/{name}", "scene", "tables", "frames", "surfaces", "bodies")
+        self._bodies = _Paths(f"/{name}/bodies", "surfaces")
+        add_scene(self._stage, f"/{name}/scene", cell.gravity)
+        self._surfaces: dict[Friction, Any] = {}
         library = f"/{name}_shapes"
         self._stage.CreateClassPrim(library)
         self._shapes = {
@@ -136,6 +142,55 @@ class _Stage:
         self._add_joints(standing, links)
         self._add_mounts(standing, links)
 
+    def add_body(self, body: ExportedBody) -> None:
+        """Define a body of a task where it is now, and its joints."""
+        path = self._bodies.of(body.name)
+        root, *others = body.links
+        paths = {root.name: path}
+        if body.joints:
+            prim = UsdGeom.Xform.Define(self._stage, path).GetPrim()
+            UsdPhysics.ArticulationRootAPI.Apply(prim)
+            inside = _Paths(path, "joints")
+            paths = {link.name: inside.of(link.name) for link in body.links}
+        self._add_piece(root, paths[root.name], body)
+        for link in others:
+            self._add_piece(link, paths[link.name], replace(body, moves=True, stands=False))
+        if not body.joints:
+            return
+        joints = _Paths(f"{path}/joints")
+        self._stage.DefinePrim(joints.above, "Scope")
+        if not body.moves:
+            add_fixed_base(self._stage, joints.of("fixed"), paths[root.name], root.pose)
+        for own in body.joints:
+            joint = own.model
+            ends = paths[joint.parent], paths[joint.child]
+            add_joint(self._stage, joints.of(joint.name), ends, joint, own.position, own.anchor)
+            prim = self._stage.GetPrimAtPath(joints.of(joint.name))
+            add_losses(prim, own.drive)
+            if own.drive.stiffness or own.drive.damping:
+                add_drive(prim, joint, own.drive, own.rest)
+
+    def _add_piece(self, link: BodyLink, path: str, body: ExportedBody) -> None:
+        """Define a link of a body."""
+        made = UsdGeom.Xform.Define(self._stage, path)
+        prim = made.GetPrim()
+        place(made, link.pose)
+        prim.SetDisplayName(link.name)
+        if not body.stands or body.joints:
+            rigid = UsdPhysics.RigidBodyAPI.Apply(prim)
+            rigid.CreateKinematicEnabledAttr(not body.moves and not body.joints)
+        for number, drawn in enumerate(link.drawn):
+            add_drawn(self._stage, f"{path}/drawn/mesh_{number}", drawn, guide=body.marker)
+        for number, own in enumerate(link.solids(("mesh",))):
+            solid = f"{path}/solid/shape_{number}"
+            add_solid(self._stage, solid, own.solid)
+            add_substance(self._stage.GetPrimAtPath(solid), own)
+            material = self._surfaces.get(own.friction)
+            if material is None:
+                name = f"{self._bodies.above}/surfaces/surface_{len(self._surfaces)}"
+                material = self._surfaces[own.friction] = surface(self._stage, name, own.friction)
+            bind(self._stage.GetPrimAtPath(solid), material)
+
     def _add_link(self, source: RobotSource, link: str, path: str, pose: Floats) -> None:
         made = UsdGeom.Xform.Define(self._stage, path)
         prim = made.GetPrim()
@@ -155,10 +210,7 @@ class _Stage:
         friction = source.friction_of(link)
         if friction is not None:
             name = f"{self._paths.above}/surfaces/{_identifier(source.name)}"
-            material = surface(self._stage, name, source.robot.gripper_material)
-            UsdShade.MaterialBindingAPI.Apply(prim).Bind(
-                material, UsdShade.Tokens.weakerThanDescendants, "physics"
-            )
+            bind(prim, surface(self._stage, name, source.robot.gripper_material))
 
     def _add_joints(self, standing: Standing, links: _Paths) -> None:
         source, joints = standing.source, _Paths(f"{links.above}/joints")
@@ -169,7 +221,13 @@ class _Stage:
         for joint in source.model.ordered:
             ends = links.of(joint.parent), links.of(joint.child)
             home = standing.home.get(joint.name, 0.0)
-            add_joint(self._stage, joints.of(joint.name), ends, joint, source, home)
+            add_joint(self._stage, joints.of(joint.name), ends, joint, home)
+            drive = source.drives.get(joint.name)
+            if drive is not None and joint.moves:
+                prim = self._stage.GetPrimAtPath(joints.of(joint.name))
+                add_losses(prim, drive)
+                if joint.name in source.leaders:
+                    add_drive(prim, joint, drive, home)
         for joint in source.followers:
             prim = self._stage.GetPrimAtPath(joints.of(joint.name))
             tie(prim, joints.of(joint.mimics or ""), joint)
@@ -206,9 +264,23 @@ def quaternion(rotation: Floats) -> Any:
     return Gf.Quatf(w, x, y, z)
 
 
-def add_drawn(stage: Any, path: str, drawn: Drawn) -> None:
-    """Define a mesh that is only drawn."""
+def add_scene(stage: Any, path: str, gravity: Vector3) -> None:
+    """Define which way things fall, and how fast (m/s²), where it is not as on Earth."""
+    scene = UsdPhysics.Scene.Define(stage, path)
+    if gravity == EARTH:
+        return
+    strength = math.hypot(*gravity)
+    if strength:
+        x, y, z = (along / strength for along in gravity)
+        scene.CreateGravityDirectionAttr(Gf.Vec3f(x, y, z))
+    scene.CreateGravityMagnitudeAttr(strength)
+
+
+def add_drawn(stage: Any, path: str, drawn: Drawn, *, guide: bool = False) -> None:
+    """Define a mesh that is only drawn; a guide is, where people look for it."""
     mesh = _mesh(stage, path, drawn.mesh)
+    if guide:
+        mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
     red, green, blue, alpha = drawn.rgba
     mesh.CreateDisplayColorAttr([(red, green, blue)])
     mesh.CreateDisplayOpacityAttr([alpha])
@@ -217,14 +289,20 @@ def add_drawn(stage: Any, path: str, drawn: Drawn) -> None:
 def add_solid(stage: Any, path: str, solid: CollisionShape) -> None:
     """Define a shape that collides and is not drawn."""
     shape = solid.shape
-    if solid.hull is not None:
-        made = _mesh(stage, path, solid.hull)
+    if solid.mesh is not None:
+        made = _mesh(stage, path, solid.mesh)
         api = UsdPhysics.MeshCollisionAPI.Apply(made.GetPrim())
-        api.CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
+        api.CreateApproximationAttr(
+            UsdPhysics.Tokens.convexHull if solid.convex else UsdPhysics.Tokens.none
+        )
     elif shape.kind == "box":
         made = UsdGeom.Cube.Define(stage, path)
         made.CreateSizeAttr(1.0)
         place(made, shape.origin, np.array(shape.sizes))
+    elif shape.kind == PLANE:
+        made = UsdGeom.Plane.Define(stage, path)
+        made.CreateAxisAttr(UsdGeom.Tokens.x)
+        place(made, shape.origin)
     elif shape.kind == "sphere":
         made = UsdGeom.Sphere.Define(stage, path)
         made.CreateRadiusAttr(shape.sizes[0])
@@ -267,15 +345,36 @@ def set_inertia(prim: Any, inertial: LinkInertia) -> None:
     mass.CreatePrincipalAxesAttr(quaternion(axes))
 
 
-def surface(stage: Any, path: str, material: GripperMaterial | None) -> Any:
-    """Return the material of what grasps, which is defined if it is not yet."""
+def surface(stage: Any, path: str, material: GripperMaterial | Friction | None) -> Any:
+    """Return the material of what grasps or is grasped, which is defined if it is not yet."""
     made = UsdShade.Material.Define(stage, path)
-    if material is not None:
-        api = UsdPhysics.MaterialAPI.Apply(made.GetPrim())
-        api.CreateStaticFrictionAttr(material.static_friction)
-        api.CreateDynamicFrictionAttr(material.dynamic_friction)
-        api.CreateRestitutionAttr(material.restitution)
+    if material is None:
+        return made
+    if isinstance(material, Friction):
+        static, dynamic = material.static, material.dynamic
+    else:
+        static, dynamic = material.static_friction, material.dynamic_friction
+    api = UsdPhysics.MaterialAPI.Apply(made.GetPrim())
+    api.CreateStaticFrictionAttr(static)
+    api.CreateDynamicFrictionAttr(dynamic)
+    api.CreateRestitutionAttr(material.restitution)
     return made
+
+
+def bind(prim: Any, material: Any) -> None:
+    """Give a prim, and what is below it, a material in contacts."""
+    weaker = UsdShade.Tokens.weakerThanDescendants
+    UsdShade.MaterialBindingAPI.Apply(prim).Bind(material, weaker, "physics")
+
+
+def add_substance(prim: Any, shape: BodyShape) -> None:
+    """Say what a shape of a body is like inside, and how its contacts resist that it turns."""
+    UsdPhysics.MassAPI.Apply(prim).CreateDensityAttr(shape.density)
+    if shape.patch_radius or shape.min_patch_radius:
+        prim.AddAppliedSchema("PhysxCollisionAPI")
+        name = "physxCollision:{}orsionalPatchRadius"
+        set_attribute(prim, name.format("t"), "Float", shape.patch_radius)
+        set_attribute(prim, name.format("minT"), "Float", shape.min_patch_radius)
 
 
 def add_camera(stage: Any, path: str, camera: CameraMount) -> None:
@@ -321,10 +420,10 @@ def add_joint(
     path: str,
     links: tuple[str, str],
     joint: ModelJoint,
-    source: RobotSource,
-    home: float,
+    position: float,
+    anchor: Floats = ORIGIN,
 ) -> None:
-    """Define a joint between two links, with its limits, and its drive if it follows no other.
+    """Define a joint between two links, with its limits.
 
     USD counts turns in degrees. Joints turn about or slide along the x axis of frames on both
     links.
@@ -334,8 +433,8 @@ def add_joint(
         path: Of the joint.
         links: Paths of the link that carries it, and of the one that it carries.
         joint: The joint.
-        source: Its robot.
-        home: Its position where the layout starts the robot (rad or m).
+        position: Where it is (rad or m).
+        anchor: Where it is in the frame of the link that it carries, (3,) (m).
     """
     kinds: dict[str, Any] = {
         "fixed": UsdPhysics.FixedJoint,
@@ -347,33 +446,39 @@ def add_joint(
     prim = made.GetPrim()
     prim.SetDisplayName(joint.name)
     if not joint.moves:
-        _set_frames(made, joint.origin, np.eye(3))
+        _set_frames(made, joint.origin, np.eye(3), anchor)
         return
     made.CreateAxisAttr(UsdPhysics.Tokens.x)
-    _set_frames(made, joint.origin, _along(joint.axis))
+    _set_frames(made, joint.origin, _along(joint.axis), anchor)
     unit = _per_unit(joint)
     if joint.lower is not None and joint.upper is not None:
         made.CreateLowerLimitAttr(joint.lower * unit)
         made.CreateUpperLimitAttr(joint.upper * unit)
-    way = "linear" if joint.type == "prismatic" else "angular"
+    way = _way(joint)
     prim.AddAppliedSchema(f"PhysicsJointStateAPI:{way}")
-    set_attribute(prim, f"state:{way}:physics:position", "Float", home * unit)
+    set_attribute(prim, f"state:{way}:physics:position", "Float", position * unit)
     prim.AddAppliedSchema("PhysxJointAPI")
     if joint.velocity:
         set_attribute(prim, "physxJoint:maxJointVelocity", "Float", joint.velocity * unit)
-    drive = source.drives.get(joint.name)
-    if drive is not None and drive.armature:
+
+
+def add_losses(prim: Any, drive: JointDrive) -> None:
+    """Give a joint the inertia of its motor, and friction."""
+    if drive.armature:
         set_attribute(prim, "physxJoint:armature", "Float", drive.armature)
-    if drive is not None and drive.friction:
+    if drive.friction:
         set_attribute(prim, "physxJoint:jointFriction", "Float", drive.friction)
-    if joint.name in source.leaders:
-        drive = source.drives[joint.name]
-        api = UsdPhysics.DriveAPI.Apply(prim, way)
-        api.CreateTypeAttr(UsdPhysics.Tokens.force)
-        api.CreateStiffnessAttr(drive.stiffness / unit)
-        api.CreateDampingAttr(drive.damping / unit)
-        api.CreateMaxForceAttr(drive.force)
-        api.CreateTargetPositionAttr(home * unit)
+
+
+def add_drive(prim: Any, joint: ModelJoint, drive: JointDrive, target: float) -> None:
+    """Give a joint a spring, which pulls it towards a target (rad or m), and a damper."""
+    unit = _per_unit(joint)
+    api = UsdPhysics.DriveAPI.Apply(prim, _way(joint))
+    api.CreateTypeAttr(UsdPhysics.Tokens.force)
+    api.CreateStiffnessAttr(drive.stiffness / unit)
+    api.CreateDampingAttr(drive.damping / unit)
+    api.CreateMaxForceAttr(drive.force)
+    api.CreateTargetPositionAttr(target * unit)
 
 
 def tie(prim: Any, leader: str, joint: ModelJoint) -> None:
@@ -402,11 +507,15 @@ def _per_unit(joint: ModelJoint) -> float:
     return 1.0 if joint.unit == "m" else math.degrees(1.0)
 
 
-def _set_frames(joint: Any, origin: Floats, turned: Floats) -> None:
-    """Set a joint's frames on both links, the second at that link's origin."""
+def _way(joint: ModelJoint) -> str:
+    return "linear" if joint.type == "prismatic" else "angular"
+
+
+def _set_frames(joint: Any, origin: Floats, turned: Floats, anchor: Floats = ORIGIN) -> None:
+    """Set a joint's frames on both links, the second at a place of that link, (3,) (m)."""
     joint.CreateLocalPos0Attr(Gf.Vec3f(*origin[:3, 3].tolist()))
     joint.CreateLocalRot0Attr(quaternion(origin[:3, :3] @ turned))
-    joint.CreateLocalPos1Attr(Gf.Vec3f(0.0, 0.0, 0.0))
+    joint.CreateLocalPos1Attr(Gf.Vec3f(*anchor.tolist()))
     joint.CreateLocalRot1Attr(quaternion(turned))
 
 

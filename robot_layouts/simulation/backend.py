@@ -147,8 +147,12 @@ SIMULATORS = {
 }
 """Where each simulator's backend is, by the name that ``simulator=`` takes."""
 
-EXPORT = "robot_layouts.simulation.mujoco.export:write_world"
-"""What writes a world of any simulator as a model for MuJoCo."""
+EXPORTS = {
+    "mjcf": "robot_layouts.simulation.mujoco.export:write_mjcf_world",
+    "usd": "robot_layouts.simulation.exported:write_usd_world",
+    "ros2": "robot_layouts.simulation.exported:write_ros2_world",
+}
+"""What writes a world of any simulator for other programs, by the format."""
 
 ON_DEVICES = "mujoco_warp"
 """The simulator of whole vectors on a device, which is no `Backend`: `tasks.interfaces.device`."""

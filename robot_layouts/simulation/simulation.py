@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from layouts import Layout
 from objects import ObjectDescriptor
-from robot_layouts.simulation.backend import EXPORT, Backend, Rows, open_backend
+from robot_layouts.simulation.backend import EXPORTS, Backend, Rows, open_backend
 from robot_layouts.simulation.cameras import AnyCamera, View
 from robot_layouts.simulation.control.joint_positions import JointPositionController
 from robot_layouts.simulation.control.modes import ModeController
@@ -245,17 +245,23 @@ class Simulation:
             self._change()
         return self.backend.look(env, cameras, textures, markers=markers)
 
-    def to_mjcf(
-        self, state: State, path: str | PathLike[str], things: Iterable[ObjectDescriptor] = ()
+    def export(
+        self,
+        written_as: str,
+        state: State,
+        path: str | PathLike[str],
+        things: Iterable[ObjectDescriptor] = (),
     ) -> Path:
-        """Write the first world as one MJCF model, in a state; see `tasks.TaskEnv.to_mjcf`.
+        """Write the first world in a state for other programs.
 
         Args:
+            written_as: The format, one of `EXPORTS`; see `tasks.TaskEnv.to_mjcf`, ``to_usd`` and
+                ``to_ros2``.
             state: The state.
-            path: Where to write it; must end in ``.xml``.
+            path: Where to write it.
             things: Whose licences are named beside those of robots.
         """
-        return resolve_name(EXPORT)(self, state, path, things)
+        return resolve_name(EXPORTS[written_as])(self.worlds[0], state, path, things)
 
     def describe_graphics(self) -> dict[str, str]:
         """Return on what pictures are drawn; see `Backend.describe_graphics`."""

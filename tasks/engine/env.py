@@ -427,8 +427,57 @@ class TaskEnv(Remade):
             SimulationError: If MuJoCo cannot do what the task's physics settings ask for.
             MissingPackageError: If mujoco is not installed.
         """
+        return self._export("mjcf", path)
+
+    def to_usd(self, path: str | PathLike[str]) -> Path:
+        """Save the first environment as one USD stage, as it stands.
+
+        It has the robots as `layouts.Layout.to_usd` describes them, where they are now, and below
+        ``bodies`` the task's bodies: rigid bodies with density and friction, articulations of
+        those with joints, kinematic ones of those that only the task moves, and colliders alone of
+        those that nothing moves. Display names are the task's. What is there for people only is a
+        guide. Textures become their mean colour; what varies in each episode beyond sizes and
+        places is as declared.
+
+        Args:
+            path: Where to save; must end in ``.usd``, ``.usda`` or ``.usdc``.
+
+        Returns:
+            The path of the stage.
+
+        Raises:
+            LayoutError: If the path ends otherwise.
+            AssetError: If a file of a robot or a body cannot be found or is invalid.
+            MissingPackageError: If usd-core or scipy is not installed.
+        """
+        return self._export("usd", path)
+
+    def to_ros2(self, folder: str | PathLike[str]) -> Path:
+        """Save the first environment as a ROS 2 package for MoveIt and ros2_control, as it stands.
+
+        It is the package of `layouts.Layout.to_ros2`, with robots at home where they are now.
+        Bodies that nothing moves are links of its URDF. Those that move are objects of MoveIt's
+        planning scene, ``config/bodies.scene``, which the launch file publishes, and each has a
+        URDF of its own in ``urdf/bodies`` for simulators; ``config/bodies.yaml`` says where it is
+        (m, xyzw), whether something holds it there, and where its joints are and their springs,
+        which no URDF has. Planes are slabs of 100 m.
+
+        Args:
+            folder: See `layouts.Layout.to_ros2`.
+
+        Returns:
+            The folder.
+
+        Raises:
+            LayoutError: If the folder's name is no valid package name, or it holds something else.
+            AssetError: If a file of a robot or a body cannot be found or is invalid.
+            MissingPackageError: If scipy is not installed.
+        """
+        return self._export("ros2", folder)
+
+    def _export(self, written_as: str, path: str | PathLike[str]) -> Path:
         things = [own.descriptor for own in self.task.bodies.values() if isinstance(own, Object)]
-        return self.simulation.to_mjcf(self._state, path, things)
+        return self.simulation.export(written_as, self._state, path, things)
 
     def begin_tape(self) -> StateTape:
         """Return a tape of states for the present episode; see `write_tape`."""

@@ -3,14 +3,28 @@
 import math
 from collections import Counter
 
+import mujoco
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial import ConvexHull as QhullsHull
 
-from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Mesh, Plane, Sphere
-from objects.solids import bounds, hull_triangles, lowest, mass_of, pieces, reach, sampled, surface
+from objects.shapes import Box, Capsule, ConvexHull, Cylinder, Friction, Mesh, Plane, Sphere
+from objects.solids import (
+    bounds,
+    hull_triangles,
+    inertia_of,
+    lowest,
+    mass_of,
+    pieces,
+    reach,
+    sampled,
+    surface,
+)
 from robot_layouts.kinematics.quaternions import normalised
+from robot_layouts.kinematics.rotations import pose_matrix
+from robot_layouts.simulation.mujoco.bodies import BodyMaker
+from robot_layouts.simulation.world import WorldBody
 from robots import DescriptorError, SimulationError
 
 TURNED = normalised((0.8, 0.1, -0.4, 0.3))
@@ -22,6 +36,10 @@ SHAPES = (
     Capsule(0.1, 0.3, position=(0.0, 0.5, 0.0), quaternion=TURNED),
     ConvexHull(CORNERS, quaternion=TURNED),
 )
+
+
+def _kind(shape):
+    return type(shape).__name__
 
 
 @pytest.mark.parametrize(
@@ -67,6 +85,22 @@ def test_a_surface_reaches_as_far_as_its_shape_and_holds_nearly_its_volume(shape
     ways = found.normals / np.linalg.norm(found.normals, axis=1, keepdims=True)
     heights = np.einsum("nti,ti->nt", points[:, None] - one, ways)
     assert np.abs(heights.max(axis=1)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "shapes", [*((shape,) for shape in SHAPES), SHAPES], ids=lambda s: "+".join(map(_kind, s))
+)
+def test_what_shapes_weigh_and_how_hard_they_turn_is_as_in_mujoco(shapes):
+    spec = mujoco.MjSpec()
+    maker = BodyMaker(spec, Friction(), [0.02, 1.0], drawn=False)
+    maker.add(WorldBody("whole", shapes))
+    model = spec.compile()
+    body, found = model.body("/whole"), mass_of(shapes)
+    assert found.mass == pytest.approx(body.mass[0])
+    assert found.centre == pytest.approx(body.ipos)
+    turn = pose_matrix(body.ipos, body.iquat)[:3, :3]
+    theirs = turn @ np.diag(body.inertia) @ turn.T
+    assert inertia_of(shapes, found.centre) == pytest.approx(theirs, rel=1e-6)
 
 
 def test_bounds_and_the_lowest_point_count_what_collides():

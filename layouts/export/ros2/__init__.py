@@ -7,23 +7,28 @@ import re
 from collections.abc import Iterator, Mapping
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
-from layouts.export.cell import ExportedCell, RobotSource, Standing
+from layouts.export.cell import BODIES, ExportedCell, RobotSource, Standing
 from layouts.export.files import LICENCES, licence_note, replaced_folder, short_licences
 from layouts.export.meshes import MeshFolder, drawn_meshes, solid_shapes
+from layouts.export.ros2.bodies import SCENE, moved_bodies, standing_bodies
+from layouts.export.ros2.elements import (
+    collision,
+    inertial,
+    mesh_element,
+    paint,
+    shape_element,
+    xml_text,
+)
 from layouts.export.ros2.groups import WORLD, PlanningGroups, RosNames
-from layouts.visuals import GREY, Rgba
+from layouts.visuals import GREY
 from robot_layouts.core.pages import fragment
-from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix
+from robot_layouts.kinematics.rotations import inverse_pose, pose_matrix
 from robots import LayoutError
 from robots.bodies.allowed import joined_pairs, rigid_groups, rigid_pairs
-from robots.urdf.model import LinkInertia, ModelJoint
+from robots.urdf.model import ModelJoint
 from robots.urdf.text import joint_element, origin_of, text
-
-if TYPE_CHECKING:
-    from layouts.arrangement import Arrangement
 
 CONFIGS = (
     "joint_limits",
@@ -38,10 +43,8 @@ SPEEDS = {"rad": 1.0, "m": 0.1}  # per second, of joints whose URDF has no large
 Shapes = dict[str, list[Element]]
 
 
-def write_ros2(
-    layout: Arrangement, folder: str | os.PathLike[str], *, visuals: bool = True
-) -> Path:
-    """Write a layout as a ROS 2 package; see `layouts.Layout.to_ros2`."""
+def write_ros2(cell: ExportedCell, folder: str | os.PathLike[str], *, visuals: bool = True) -> Path:
+    """Write a cell as a ROS 2 package; see `layouts.Layout.to_ros2` and `tasks.TaskEnv.to_ros2`."""
     target = Path(folder)
     package = target.absolute().name
     if not re.fullmatch(r"[a-z](_?[a-z0-9])+", package):
@@ -49,7 +52,6 @@ def write_ros2(
             f"a ROS 2 package cannot be called {package!r}; its folder's name takes two or more"
             f" small letters, digits and single _, and begins with a letter: {_proper(package)!r}"
         )
-    cell = ExportedCell.read(layout, visuals=visuals)
     with replaced_folder(target, _is_own, "save the package under another name") as made:
         for name in ("config", "launch", "meshes", "urdf"):
             (made / name).mkdir()
@@ -80,18 +82,24 @@ def _write(folder: Path, cell: ExportedCell, package: str, *, visuals: bool) -> 
         "groups": groups,
         "robots": cell.robots,
         "speeds": dict(_speeds(cell, names)),
-        "disabled": [*_allowed_pairs(cell, names), *_pairs_on_tables(cell, names)],
+        "disabled": [*_allowed_pairs(cell, names), *_pairs_that_stand(cell, names)],
+        "scene": SCENE if names.moved else "",
     }
     texts = {
-        f"urdf/{package}.urdf": _xml(_description(cell, names, package, meshes, visuals=visuals)),
+        f"urdf/{package}.urdf": xml_text(
+            _description(cell, names, package, meshes, visuals=visuals)
+        ),
         f"urdf/{package}.urdf.xacro": _filled("cell.urdf.xacro", content),
         f"config/{package}.srdf": _filled("cell.srdf", content),
         **{f"config/{name}.yaml": _filled(f"{name}.yaml", content) for name in CONFIGS},
         "launch/demo.launch.py": _filled("demo.launch.py", content),
         "package.xml": _filled("package.xml", content),
         "CMakeLists.txt": _filled("CMakeLists.txt", content),
-        LICENCES: licence_note(robots),
+        LICENCES: licence_note(robots, cell.things),
     }
+    if names.moved:
+        (folder / "urdf" / "bodies").mkdir()
+        texts |= moved_bodies(cell, names, *_of_bodies(meshes, package))
     for name, written in texts.items():
         (folder / name).write_text(written, encoding="utf-8")
 
@@ -111,13 +119,14 @@ def _allowed_pairs(cell: ExportedCell, names: RosNames) -> Iterator[tuple[str, s
             yield names.link(place, one), names.link(place, other), reason
 
 
-def _pairs_on_tables(cell: ExportedCell, names: RosNames) -> Iterator[tuple[str, str, str]]:
-    """Yield tables and the links that stand still on them."""
-    for table, (place, standing) in product(cell.tables, cell.robots.items()):
+def _pairs_that_stand(cell: ExportedCell, names: RosNames) -> Iterator[tuple[str, str, str]]:
+    """Yield tables and other bodies that stand, and the links that stand still on them."""
+    stand = (*(names.frames[table] for table in cell.tables), *names.standing.values())
+    for one, (place, standing) in product(stand, cell.robots.items()):
         model = standing.source.model
         for link in rigid_groups(model)[model.root]:
             if link in model.collisions:
-                yield names.frames[table], names.link(place, link), "Never"
+                yield one, names.link(place, link), "Never"
 
 
 def _speeds(cell: ExportedCell, names: RosNames) -> Iterator[tuple[str, float]]:
@@ -130,11 +139,6 @@ def _speeds(cell: ExportedCell, names: RosNames) -> Iterator[tuple[str, float]]:
 
 def _filled(template: str, content: Mapping[str, object]) -> str:
     return f"{fragment(f'layouts.export.ros2/{template}.jinja', **content).rstrip()}\n"
-
-
-def _xml(root: Element) -> str:
-    indent(root)
-    return f'<?xml version="1.0"?>\n{tostring(root, encoding="unicode")}\n'
 
 
 def _description(
@@ -158,6 +162,8 @@ def _description(
     }
     for standing in cell.robots.values():
         root.extend(_robot(standing, names, shapes[id(standing.source)]))
+    if names.standing:
+        root.extend(standing_bodies(cell, names, *_of_bodies(meshes, package)))
     for tool in cell.tools:
         link = names.tool(tool)
         SubElement(root, "link", name=link)
@@ -165,6 +171,11 @@ def _description(
         carrier = names.link(tool.place, tool.link)
         root.append(joint_element(names.fixed_joint(link), "fixed", carrier, link, origin_of(pose)))
     return root
+
+
+def _of_bodies(meshes: Path, package: str) -> tuple[MeshFolder, str]:
+    """Return the folder of the meshes of a task's bodies, and its address."""
+    return MeshFolder(meshes / BODIES), f"package://{package}/meshes/{BODIES}"
 
 
 def _speed_of(joint: ModelJoint) -> float:
@@ -181,9 +192,9 @@ def _frames(cell: ExportedCell, names: RosNames) -> Iterator[Element]:
             middle, size = cell.tables[name]
             own = inverse_pose(pose) @ middle
             for kind in ("visual", "collision"):
-                shape = _shape(kind, own, "box", size=text(*size.tolist()))
+                shape = shape_element(kind, own, "box", size=text(*size.tolist()))
                 if kind == "visual":
-                    _paint(shape, names.frames[name], GREY)
+                    paint(shape, names.frames[name], GREY)
                 link.append(shape)
         yield link
         made = names.frames[name]
@@ -197,7 +208,7 @@ def _robot(standing: Standing, names: RosNames, shapes: Shapes) -> Iterator[Elem
     for name in source.model.links:
         link = Element("link", name=names.link(place, name))
         if name in source.inertials:
-            link.append(_inertial(source.inertials[name]))
+            link.append(inertial(source.inertials[name]))
         link.extend(shapes[name])
         yield link
     for joint in source.root.iterfind("joint"):
@@ -237,16 +248,6 @@ def _limit(joint: ModelJoint, source: RobotSource) -> dict[str, str]:
     return limit
 
 
-def _inertial(inertial: LinkInertia) -> Element:
-    made = Element("inertial")
-    SubElement(made, "origin", xyz=text(*inertial.origin[:3, 3].tolist()), rpy="0 0 0")
-    SubElement(made, "mass", value=repr(inertial.mass))
-    keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    numbers = inertial.tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist()
-    SubElement(made, "inertia", {k: repr(x) for k, x in zip(keys, numbers, strict=True)})
-    return made
-
-
 def _shapes(source: RobotSource, meshes: Path, uri: str, *, visuals: bool) -> Shapes:
     """Return the shapes of each link; their meshes are saved."""
     files = MeshFolder(meshes / source.name)
@@ -254,37 +255,11 @@ def _shapes(source: RobotSource, meshes: Path, uri: str, *, visuals: bool) -> Sh
     for link, drawn in drawn_meshes(source, visuals=visuals).items():
         for number, mesh in enumerate(drawn):
             file = files.save(mesh.mesh, f"{link}_visual")
-            shape = _mesh("visual", f"{uri}/{source.name}/{file}")
-            _paint(shape, f"{source.name}_{link}_{number}", mesh.rgba)
+            shape = mesh_element("visual", f"{uri}/{source.name}/{file}")
+            paint(shape, f"{source.name}_{link}_{number}", mesh.rgba)
             shapes[link].append(shape)
     for link, solids in solid_shapes(source).items():
         for solid in solids:
-            own = solid.shape
-            if solid.hull is not None:
-                file = files.save(solid.hull, f"{link}_collision")
-                shapes[link].append(_mesh("collision", f"{uri}/{source.name}/{file}"))
-            elif own.kind == "box":
-                shapes[link].append(_shape("collision", own.origin, "box", size=text(*own.sizes)))
-            else:
-                keys = ("radius", "length")[: len(own.sizes)]
-                sizes = {key: repr(float(x)) for key, x in zip(keys, own.sizes, strict=True)}
-                shapes[link].append(_shape("collision", own.origin, own.kind, **sizes))
+            file = files.save(solid.mesh, f"{link}_collision") if solid.mesh is not None else ""
+            shapes[link].append(collision(solid, f"{uri}/{source.name}/{file}"))
     return shapes
-
-
-def _mesh(kind: str, uri: str) -> Element:
-    shape = Element(kind)
-    SubElement(SubElement(shape, "geometry"), "mesh", filename=uri)
-    return shape
-
-
-def _shape(kind: str, pose: Floats, geometry: str, **sizes: str) -> Element:
-    shape = Element(kind)
-    SubElement(shape, "origin", origin_of(pose))
-    SubElement(SubElement(shape, "geometry"), geometry, sizes)
-    return shape
-
-
-def _paint(shape: Element, name: str, rgba: Rgba) -> None:
-    material = SubElement(shape, "material", name=name)
-    SubElement(material, "color", rgba=text(*rgba))

@@ -20,6 +20,8 @@ class RosNames:
     Attributes:
         frames: Of the layout's frames, as links.
         systems: Of what drives the robot in each place.
+        standing: Of a task's bodies that nothing moves, as links.
+        moved: Of those that collide and may move, and of the parts that joints move.
     """
 
     def __init__(self, cell: ExportedCell) -> None:
@@ -38,7 +40,15 @@ class RosNames:
         self._tools = {tool.arm: links.new(f"{tool.arm}_tcp") for tool in cell.tools}
         self.frames = {name: links.new(name) for name in cell.layout.frames}
         roots = [self.link(n, standing.source.model.root) for n, standing in cell.robots.items()]
-        fixed = (*roots, *self._tools.values(), *self.frames.values())
+        solid = [body for body in cell.bodies if body.collides]
+        self.standing = {body.name: links.new(body.name) for body in solid if body.stands}
+        self.moved = {
+            link.name: links.new(link.name)
+            for body in solid
+            for link in body.links
+            if not body.stands
+        }
+        fixed = (*roots, *self._tools.values(), *self.frames.values(), *self.standing.values())
         self._fixed = {link: joints.new(f"{link}_fixed") for link in fixed}
 
     def link(self, place: str, link: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from layouts.visuals import load_meshes
+from layouts.visuals import load_meshes, mean_color, shown_color
 from objects.files.mesh import convex_hulls
 from objects.joints import Joint
 from objects.shapes import (
@@ -233,7 +233,7 @@ def add_drawn(spec: Any, body: Any, shape: Shape, geom: dict[str, Any], *, marke
     """
     ghost = {"contype": 0, "conaffinity": 0, "mass": 0.0, "group": MARKERS if marker else DRAWN}
     if not isinstance(shape, Mesh):
-        body.add_geom(**geom, **ghost, rgba=_as_screens_show(shape.color))
+        body.add_geom(**geom, **ghost, rgba=shown_color(shape.color))
         return
     for mesh in load_meshes(str(shape.path), str(shape.path)):
         name = f"{body.name}/drawn{len(spec.meshes)}"
@@ -243,21 +243,5 @@ def add_drawn(spec: Any, body: Any, shape: Shape, geom: dict[str, Any], *, marke
             userface=np.asarray(mesh.faces, int).ravel().tolist(),
             inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
         )
-        color = _own_color(mesh) if shape.textured else _as_screens_show(shape.color)
+        color = mean_color(mesh) if shape.textured else shown_color(shape.color)
         body.add_geom(**{**geom, "meshname": name}, **ghost, rgba=color)
-
-
-def _own_color(mesh: Any) -> list[float]:
-    """Return the mean colour of a mesh's material, red, green, blue, alpha from 0 to 1."""
-    material = getattr(mesh.visual, "material", None)
-    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    if image is not None:
-        return [*(np.asarray(image.convert("RGB")).reshape(-1, 3).mean(0) / 255).tolist(), 1.0]
-    main = getattr(material, "main_color", (180, 180, 180, 255))
-    return (np.asarray(main, float) / 255).tolist()
-
-
-def _as_screens_show(color: tuple[float, float, float, float]) -> list[float]:
-    """Return a colour, which is linear, as screens encode it; MuJoCo draws it as it is."""
-    *light, alpha = color
-    return [*(np.array(light) ** (1 / 2.2)).tolist(), alpha]

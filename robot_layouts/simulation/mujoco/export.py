@@ -13,21 +13,20 @@ from robot_layouts.core.writing import write_whole
 from robot_layouts.simulation.mujoco import mujoco
 from robot_layouts.simulation.mujoco.bodies import PREFIX
 from robot_layouts.simulation.mujoco.model import Inventory, RobotModels, rub_joints
-from robot_layouts.simulation.simulation import Simulation
 from robot_layouts.simulation.state import State
+from robot_layouts.simulation.world import World
 
 NOW = "now"  # the keyframe
 
 
-def write_world(
-    simulation: Simulation,
+def write_mjcf_world(
+    world: World,
     state: State,
     path: str | os.PathLike[str],
     things: Iterable[ObjectDescriptor] = (),
 ) -> Path:
-    """Write the first world of a simulation as one MJCF; see `tasks.TaskEnv.to_mjcf`."""
+    """Write a simulation's first world as one MJCF; see `tasks.TaskEnv.to_mjcf`."""
     target = expect_ending(path, "MJCF", ".xml")
-    world = simulation.worlds[0]
     models = RobotModels(world.layout, visuals=True)
     spec = models.describe(world, drawn=True)
     spec.modelname = target.stem
