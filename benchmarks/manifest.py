@@ -205,7 +205,8 @@ def build_objects(package: IndexPackage) -> AssetPackage:
         for path in metadata.files(package.name) or ()
         if path.name in LICENCE_FILES and ".dist-info" in path.parts[0]
     )
-    licence = _named_licence(read_text(installed / notice, LARGEST_FILE), readme=False)
+    named = _named_licence(read_text(installed / notice, LARGEST_FILE), readme=False)
+    licence = package.licence or named
     origin = _origin(package, name, "", "object", (licence, TERMS[licence], notice))
     needs: dict[str, set[str]] = {}
     for thing in PACKAGED.values():

@@ -57,6 +57,7 @@ KINDS = {
     "stock": "Stock and tools",
     "two_handed": "Things for two hands",
     "vessels": "Vessels",
+    "gymnasium_robotics": "Things of a kitchen",
     "metaworld": "Things of Meta-World",
     "pybullet": "Things of PyBullet",
     "robosuite": "Things of robosuite",
@@ -118,7 +119,7 @@ def objects(*, objects: tuple[str, ...] = NAMES, out: Path = DOCS / "objects.jso
 def kind_of(name: str) -> str:
     """Return the kind of an object: the module of its family, or its package."""
     if name in PACKAGED:
-        return name.partition("_")[0]
+        return PACKAGED[name].package.removesuffix("_objects")
     return CATALOGUE[name].partition(":")[0].rpartition(".")[2]
 
 

@@ -104,6 +104,12 @@ def measurements() -> dict[str, dict[str, Any]]:
     return json.loads(read_text(MEASURED, _LARGEST))
 
 
+def _kitchen(name: str, about: str, body: str, mass: float) -> PackagedObject:
+    folder = "gymnasium_robotics/envs/assets/kitchen_franka/kitchen_assets"
+    path, details = f"{folder}/kitchen_env_model.xml", {"body": body, "mass": mass}
+    return PackagedObject(f"kitchen_{name}", about, "gymnasium_robotics_objects", path, details)
+
+
 def _metaworld(name: str, about: str, file: str, mass: float | None = None) -> PackagedObject:
     details = {"body": 2, "mass": mass}  # 0 and 1 are the table and the wall behind it
     path = f"metaworld/assets/objects/{file}.xml"
@@ -122,6 +128,10 @@ def _pybullet(name: str, about: str, file: str, members: int = 1, **details: Any
 
 # Masses that are given here are typical of such things; those of the files are of no real thing.
 _ALL = (
+    _kitchen("hinge_cabinet", "A cabinet with two doors", "hingecabinet", 15.0),
+    _kitchen("kettle", "A kettle with a handle above it", "kettleroot", 0.9),
+    _kitchen("microwave", "A microwave oven", "microroot", 12.0),
+    _kitchen("slide_cabinet", "A cabinet with a door that slides", "slide", 15.0),
     _metaworld("ring", "A ring with a handle, to be put over a peg", "assembly_peg"),
     _metaworld("bin", "An open bin", "binA"),
     _metaworld("button_box", "A box with a button on its side", "buttonbox", 1.5),

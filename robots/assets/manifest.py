@@ -34,6 +34,7 @@ class IndexPackage:
         megabytes: Size of the wheel, roughly.
         hub_dataset: Hugging Face dataset that holds a copy of its files, if one does.
         mount: Folder that its URDFs believe to be in, as ``package://`` has it, if they do.
+        licence: Of its objects, where their files name another one than the package does.
     """
 
     name: str
@@ -42,6 +43,7 @@ class IndexPackage:
     megabytes: int
     hub_dataset: str | None = None
     mount: str | None = None
+    licence: str = ""
 
 
 MANI_SKILL = IndexPackage(
@@ -58,10 +60,17 @@ EXAMPLE_ROBOT_DATA = IndexPackage(
     megabytes=131,
     mount="example-robot-data/robots",
 )
+GYMNASIUM_ROBOTICS = IndexPackage(
+    "gymnasium_robotics",
+    robots="",
+    prefix="gymnasium_robotics_",
+    megabytes=26,
+    licence="Apache-2.0",  # of the kitchen
+)
 METAWORLD = IndexPackage("metaworld", robots="", prefix="metaworld_", megabytes=37)
 PYBULLET = IndexPackage("pybullet", robots="", prefix="pybullet_", megabytes=103)
 ROBOSUITE = IndexPackage("robosuite", robots="", prefix="robosuite_", megabytes=157)
-OBJECT_PACKAGES = (METAWORLD, PYBULLET, ROBOSUITE)
+OBJECT_PACKAGES = (GYMNASIUM_ROBOTICS, METAWORLD, PYBULLET, ROBOSUITE)
 INDEX_PACKAGES = (MANI_SKILL, EXAMPLE_ROBOT_DATA, *OBJECT_PACKAGES)
 
 

@@ -38,8 +38,8 @@ def test_eighty_things_have_names_and_twenty_five_have_joints():
 def test_the_manifest_has_its_files_with_their_licence(name):
     one = PACKAGED[name]
     package = load_manifest().package(one.package)
-    assert one.licence in ("MIT", "Zlib")
-    assert name.startswith(package.origin.distribution)
+    assert one.licence in ("Apache-2.0", "MIT", "Zlib")
+    assert name.startswith((package.origin.distribution, "kitchen_"))
     for number in {0, one.members - 1}:
         needed = {f.path for f in package.needed(one.file.format(number), pictures=False)}
         assert one.file.format(number) in needed

@@ -55,6 +55,7 @@ DUTIES = {
 WHEELS = {
     "maniskill_": "mani_skill==3.0.1",
     "example_": "example-robot-data==6.0.0",
+    "gymnasium_": "gymnasium_robotics==1.4.2",
     "metaworld_": "metaworld==3.1.1",
     "pybullet_": "pybullet==3.2.7",
     "robosuite_": "robosuite==1.5.2",
