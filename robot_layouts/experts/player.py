@@ -26,6 +26,9 @@ SETTLING, LEADING = 0.1, 0.2  # rad from its goal at which an arm settles; share
 # Share of the force with which jaws that swing close, that they hold a cube with: with more it
 # slips out in time, with less as it is lifted.
 HOLDING = 0.5
+# Share of their range that such jaws open in a control step while they still hold a thing, which
+# springs out of them if they let go of it at once.
+LETTING_GO = 0.02
 FIRM = 10  # control steps that they close on after they feel a thing: drives press harder by and by
 # What is pushed slides on by v² / 2µg (m): 2µg of bodies on a table (m/s²), and the share of its
 # way that a push may lack, unless it stands for so many control steps.
@@ -46,7 +49,8 @@ class _Jaws:
 
     def __init__(self, task: TaskEnv, robot: str, grip: Grip) -> None:
         self._robot, self._share = robot, grip.share
-        self._closing = Hand(task, robot).closing(grip.side)
+        self._hand = Hand(task, robot)
+        self._closing = self._hand.closing(grip.side)
 
     def move(self, number: float, scene: Scene) -> tuple[float | None, float | None]:
         """Return how far they open, or the force with which they close (N).
@@ -55,9 +59,10 @@ class _Jaws:
             number: Action number of the gripper, 1 to open, -1 to close.
             scene: As it is now.
         """
-        if number > 0:
-            return self._share, None
         held = any(scene.grasps(self._robot, body.name) for body in scene.bodies)
+        if number > 0:
+            most = self._hand.share(scene) + LETTING_GO if held else 1.0
+            return min(self._share, most), None
         return None, HOLDING * self._closing if held else self._closing
 
 
