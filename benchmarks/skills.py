@@ -60,6 +60,7 @@ HANDED = (
     *("mug", "pan", "peg", "plug", "pot_lid", "rack", "screwdriver", "shaft", "spoon"),
 )
 TOGETHER = ("tray", "pot_two_handles", "beam", "tote", "box")
+TRIES = 3  # of a hand-over, which takes other grasps each time
 LEVEL = 0.01  # of what is turned by 0.2 rad
 FROM_BASE, APART = 0.55, 0.62  # of a reach; of the sum of two
 CLEAR, FARTHER = 0.2, 0.65  # of a reach; where a hand begins nearer to a thing, that lies farther
@@ -189,7 +190,7 @@ class _Both:
 
         def scripts(scene: Scene) -> list[Script]:
             if over:
-                return [hand_over(env, "left", "right", "thing", thing)]
+                return [hand_over(env, "left", "right", "thing", thing)] * TRIES
             return [lift_together(env, ["left", "right"], "thing", thing, 0.1)]
 
         return env, scripts

@@ -14,7 +14,7 @@ from objects import ObjectDescriptor
 from robot_layouts.experts.geometry import gripper_facing, heading
 from robot_layouts.experts.hands import Hand
 from robot_layouts.experts.holds import AJAR, Hold, Holds, holds_of
-from robot_layouts.experts.player import StuckError
+from robot_layouts.experts.player import BlockedError, StuckError
 from robot_layouts.experts.room import room_of
 from robot_layouts.experts.routes import PRESSED, Look
 from robot_layouts.experts.script import Pose, Scene, Waypoint
@@ -322,6 +322,11 @@ class _Passing:
         self._lean, self._scale = lean, min(giver.length, taker.length) / REFERENCE
         self._meeting: _Rendezvous | None = None
         self._takes: list[Hold] | None = None
+        # The last grasp of each hand in this attempt, and those of earlier ones that failed.
+        self._picked: Hold | None = None
+        self._taken: Hold | None = None
+        self._failed_picks: list[Hold] = []
+        self._failed_takes: list[Hold] = []
         self._off = CLOSER
         fingers = task.layout.arm(taker.arm).robot.fingers
         assert fingers is not None  # or `Hand` had said so
@@ -346,6 +351,11 @@ class _Passing:
         Raises:
             StuckError: If there is none; says why.
         """
+        if self._taken is not None:  # an attempt before this one came so far
+            self._failed_takes.append(self._taken)
+        elif self._picked is not None:
+            self._failed_picks.append(self._picked)
+        self._picked = self._taken = None
         reasons = [StuckError(f"no grasp of {self._body} is left for {self.taker.arm!r}")]
         offered = (self._offered(scene, some, reasons) for some in LEANT)
         for hold, posture in chain.from_iterable(offered):
@@ -355,6 +365,7 @@ class _Passing:
             except StuckError as error:
                 reasons.append(error)
             else:
+                self._picked = hold
                 return hold, posture
         raise reasons[:2][-1]
 
@@ -379,6 +390,7 @@ class _Passing:
             if -hold.at(scene)[2, 2] >= np.cos(self._lean) - 1e-6
             and np.isfinite(_costs(hold.own, takes)).any()
         ]
+        some = [hold for hold in some if not _like_any(hold, self._failed_picks)] or some
         if not some:
             return []
         hand, up = self.giver, LIFT * self._scale
@@ -407,7 +419,7 @@ class _Passing:
         meeting = self._meeting
         assert meeting is not None
         if not any(scene.grasps(self.giver.arm, each) for each in self._givers.bodies):
-            raise StuckError(f"{self.giver.arm!r} has lost {self._body} on its way")
+            raise BlockedError(f"{self.giver.arm!r} has lost {self._body} on its way")
         self._off = CLOSER / 2  # less than was planned with, as hands are where they are by now
         now, body = self.giver.qpos(scene), pose_matrix(*scene.body(self._body))
         grip = self.giver.link(now[None])[0] @ meeting.grip
@@ -415,6 +427,7 @@ class _Passing:
         _, hold, posture = self._take(
             scene, now[None], body[None], grip[None], np.zeros(1), meeting.released, planned
         )
+        self._taken = hold
         return hold, posture
 
     def _meet(self, scene: Scene, start: Floats, in_hand: Floats, own: Hold | None) -> _Rendezvous:
@@ -479,6 +492,7 @@ class _Passing:
         giver, taker, name = self.giver, self.taker, self._body
         now = taker.qpos(scene)
         holds = self._free_takes(scene)
+        holds = [hold for hold in holds if not _like_any(hold, self._failed_takes)] or holds
         rows = [
             each
             for row, body in enumerate(bodies)
@@ -662,6 +676,10 @@ class _Passing:
 def _alike(hold: Hold) -> tuple[int, ...]:
     """Return what grasps have in common that hold a thing at about the same place and way."""
     return (*(hold.own[:3, 3] / PLACES).astype(int), *hold.own[:3, 2].round().astype(int))
+
+
+def _like_any(hold: Hold, others: Sequence[Hold]) -> bool:
+    return any(_alike(hold) == _alike(other) for other in others)
 
 
 def _costs(grip: Floats, takes: Floats) -> Floats:

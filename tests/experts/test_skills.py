@@ -25,6 +25,7 @@ from robot_layouts.experts import (
     press,
     resting,
 )
+from robot_layouts.experts.rehearsal import rehearsing
 from robots import RobotRegistry, TaskError, UnknownNameError
 from robots.grafting import with_gripper
 from tasks import Area, MultiRobotTask, Object, register_task
@@ -262,6 +263,18 @@ def test_an_arm_hands_over_what_it_holds_already():
         *lift(env, "left", "peg", 0.1),
     )
     played(env, {**script, "left": (*holding, *script["left"])})
+
+
+@pytest.mark.long
+def test_a_hand_over_that_is_played_again_takes_other_grasps():
+    env = made(Hand)
+    script, tries = hand_over(env, "left", "right", "peg", load("peg")), []
+    with rehearsing(env) as copy:
+        for _ in range(2):
+            copy.begin(0)
+            tries.append(copy.play(script, until="left.hold peg").actions)
+    assert len(tries[0])
+    assert not np.array_equal(*tries)
 
 
 class Cup(TwoArms):
