@@ -19,7 +19,6 @@ from objects.shapes import (
     Capsule,
     Cylinder,
     Floor,
-    Friction,
     Mesh,
     Plane,
     Shape,
@@ -39,21 +38,15 @@ _KINDS = {"slide": "prismatic", "turn": "revolute"}
 
 @dataclass(frozen=True, eq=False)
 class BodyShape:
-    """A shape of a body that collides, and what its surface and its inside are like.
+    """What collides of a body.
 
     Attributes:
         solid: The shape.
-        friction: Of its surface.
-        density: kg/m³.
-        patch_radius: See `objects.shapes.Shape`.
-        min_patch_radius: Likewise.
+        of: The body's own, which it is or is a part of: with friction and density.
     """
 
     solid: CollisionShape
-    friction: Friction
-    density: float
-    patch_radius: float
-    min_patch_radius: float
+    of: Shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,13 +92,7 @@ class BodyLink:
         """
         for shape in self.shapes:
             for solid in _solids(shape, hulls) if shape.collides else ():
-                yield BodyShape(
-                    solid,
-                    shape.friction or Friction(),
-                    shape.density,
-                    shape.patch_radius,
-                    shape.min_patch_radius,
-                )
+                yield BodyShape(solid, shape)
 
     @property
     def inertia(self) -> LinkInertia:

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from layouts.export.bodies import PLANE, BodyLink, BodyShape, ExportedBody
+from layouts.export.bodies import PLANE, BodyLink, ExportedBody
 from layouts.export.cell import EARTH, ExportedCell, JointDrive, RobotSource, Standing
 from layouts.export.files import Names, licence_note
 from layouts.export.meshes import CollisionShape, Drawn, drawn_meshes, solid_shapes
-from objects.shapes import Friction
+from objects.shapes import Friction, Shape
 from robot_layouts.core.importing import optional
 from robot_layouts.core.writing import PARTIAL, written_whole
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, quaternion_of
@@ -184,12 +184,14 @@ class _Stage:
         for number, own in enumerate(link.solids(("mesh",))):
             solid = f"{path}/solid/shape_{number}"
             add_solid(self._stage, solid, own.solid)
-            add_substance(self._stage.GetPrimAtPath(solid), own)
-            material = self._surfaces.get(own.friction)
-            if material is None:
-                name = f"{self._bodies.above}/surfaces/surface_{len(self._surfaces)}"
-                material = self._surfaces[own.friction] = surface(self._stage, name, own.friction)
-            bind(self._stage.GetPrimAtPath(solid), material)
+            add_substance(self._stage.GetPrimAtPath(solid), own.of)
+            bind(self._stage.GetPrimAtPath(solid), self._surface(own.of.friction or Friction()))
+
+    def _surface(self, friction: Friction) -> Any:
+        if friction not in self._surfaces:
+            name = f"{self._bodies.above}/surfaces/surface_{len(self._surfaces)}"
+            self._surfaces[friction] = surface(self._stage, name, friction)
+        return self._surfaces[friction]
 
     def _add_link(self, source: RobotSource, link: str, path: str, pose: Floats) -> None:
         made = UsdGeom.Xform.Define(self._stage, path)
@@ -367,7 +369,7 @@ def bind(prim: Any, material: Any) -> None:
     UsdShade.MaterialBindingAPI.Apply(prim).Bind(material, weaker, "physics")
 
 
-def add_substance(prim: Any, shape: BodyShape) -> None:
+def add_substance(prim: Any, shape: Shape) -> None:
     """Say what a shape of a body is like inside, and how its contacts resist that it turns."""
     UsdPhysics.MassAPI.Apply(prim).CreateDensityAttr(shape.density)
     if shape.patch_radius or shape.min_patch_radius:
