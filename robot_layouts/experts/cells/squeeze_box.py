@@ -20,6 +20,7 @@ SIDES = {"west": -1.0, "east": 1.0}
 GAP, OVER = 0.09, 0.1  # of tips before the box's sides, and higher than where they press (m)
 HELD = 0.085  # m; height of the tips when they press: hands stay above the box
 LEGS, RAISED = 5, HIGH + 0.04  # in how many steps it is lifted, and how far (m)
+OVER_PLINTH = {"down 0": 0.5}  # how far of its way over the plinth the box goes; then all of it
 TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))  # how deep tips press (m), and strokes of the push
 
 
@@ -56,13 +57,15 @@ def _pressing(task: TaskEnv, arm: str, deep: float, start: list[Floats]) -> tupl
     (other,) = (each for each in SIDES if each != arm)
     go = partial(reaching, task, arm, leans=(0.0,), as_it_is=False, gripper=CLOSED)
 
-    def beside(scene: Scene, out: float, up: float) -> Floats:
+    def beside(scene: Scene, out: float, up: float, over: float = 0.0) -> Floats:
+        """Return a place beside the box, where it stood or that far on its way over the plinth."""
         start[:] = start or [scene.body("box")[0]]
-        x, y, _ = start[0]
+        x, y, _ = start[0] + over * (scene.body("plinth")[0] - start[0])
         return np.array([x + SIDES[arm] * (BOX[0] + out), y, HELD + up])
 
     def step(name: str, up: float, before: str) -> Waypoint:
-        place = partial(beside, out=-deep, up=up)
+        over = OVER_PLINTH.get(name, float(name.startswith("down")))
+        place = partial(beside, out=-deep, up=up, over=over)
         after = (f"{other}.{before}", *(("pusher.away plinth",) if name == "down 0" else ()))
         return go(name, place, near=pi, steps=6, after=after)
 
@@ -77,7 +80,7 @@ def _pressing(task: TaskEnv, arm: str, deep: float, start: list[Floats]) -> tupl
         *(step(name, up, before[name]) for name, up in steps.items()),
         go(
             "leave",
-            partial(beside, out=GAP, up=2 * PLINTH[2]),
+            partial(beside, out=GAP, up=2 * PLINTH[2], over=1.0),
             near=0.05,
             after=(f"{other}.down {LEGS - 1}",),
         ),
