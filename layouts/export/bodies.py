@@ -13,6 +13,7 @@ import numpy as np
 from layouts.export.cell import JointDrive
 from layouts.export.meshes import AS_HULLS, CollisionShape, Drawn
 from layouts.visuals import Rgba, Visual, load_meshes, mean_color, shown_color, simplified
+from objects import ObjectDescriptor
 from objects.joints import Joint
 from objects.shapes import (
     Box,
@@ -28,9 +29,11 @@ from objects.solids import inertia_of, mass_of, pieces, surface
 from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
 from robots import AssetError
+from robots.descriptor import Vector3
 from robots.urdf.mesh_files import read_corners
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfShape
 
+EARTH: Vector3 = (0.0, 0.0, -9.81)  # m/s²
 PLANE = "plane"  # a kind of shape that no URDF has: infinite, its normal along x
 _ALONG_X = (0.5**0.5, 0.0, 0.5**0.5, 0.0)  # wxyz; cylinders lie along x here, along z elsewhere
 _KINDS = {"slide": "prismatic", "turn": "revolute"}
@@ -151,6 +154,24 @@ class ExportedBody:
     def collides(self) -> bool:
         """Whether anything of it does."""
         return any(shape.collides for link in self.links for shape in link.shapes)
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What there is besides robots in a task's world.
+
+    Attributes:
+        bodies: Its bodies.
+        things: What some of them are made after.
+        gravity: Acceleration (m/s²).
+    """
+
+    bodies: tuple[ExportedBody, ...] = ()
+    things: tuple[ObjectDescriptor, ...] = ()
+    gravity: Vector3 = EARTH
+
+
+NOTHING = Surroundings()
 
 
 def body_joint(body: str, joint: Joint, carrier: Joint | None, position: float) -> BodyJoint:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -19,7 +18,6 @@ from robot_layouts.core.commands import notice
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, transform
 from robots import AssetError, RobotDescriptor
 from robots.bodies.allowed import LinkPair, read_allowed_pairs
-from robots.descriptor import Vector3
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfModel
 from robots.urdf.reading import model_of
 from robots.urdf.summary import root_of
@@ -27,11 +25,6 @@ from robots.urdf.tcp import find_tcp
 from robots.urdf.text import numbers_of
 from robots.urdf.tree import kinematic_tree
 
-if TYPE_CHECKING:
-    from layouts.export.bodies import ExportedBody
-    from objects import ObjectDescriptor
-
-EARTH: Vector3 = (0.0, 0.0, -9.81)  # m/s²
 BODIES = "bodies"  # what the files of a task's bodies are called, and no robot's
 SMALLEST_INERTIA = 1e-6  # kg, kg·m²; of links that move and have none, as SAPIEN takes it
 
@@ -209,16 +202,10 @@ class ExportedCell:
     Attributes:
         layout: The layout.
         robots: The robots, by place.
-        gravity: Acceleration (m/s²).
-        bodies: What else there is, of a task's world.
-        things: What some of those are made after.
     """
 
     layout: Arrangement
     robots: Mapping[str, Standing]
-    gravity: Vector3 = EARTH
-    bodies: tuple[ExportedBody, ...] = ()
-    things: tuple[ObjectDescriptor, ...] = ()
 
     @classmethod
     def read(

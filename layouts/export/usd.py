@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from layouts.export.bodies import PLANE, BodyLink, ExportedBody
-from layouts.export.cell import EARTH, ExportedCell, JointDrive, RobotSource, Standing
+from layouts.export.bodies import EARTH, NOTHING, PLANE, BodyLink, ExportedBody, Surroundings
+from layouts.export.cell import ExportedCell, JointDrive, RobotSource, Standing
 from layouts.export.files import Names, licence_note
 from layouts.export.meshes import CollisionShape, Drawn, drawn_meshes, solid_shapes
 from objects.shapes import Friction, Shape
@@ -40,16 +40,17 @@ Gf, Sdf, Usd, UsdGeom = map(_pxr, ("Gf", "Sdf", "Usd", "UsdGeom"))
 UsdPhysics, UsdShade, Vt = map(_pxr, ("UsdPhysics", "UsdShade", "Vt"))
 
 
-def write_usd(cell: ExportedCell, path: str | os.PathLike[str], *, visuals: bool = True) -> Path:
+def write_usd(
+    cell: ExportedCell, target: Path, around: Surroundings = NOTHING, *, visuals: bool = True
+) -> Path:
     """Write a cell as a USD stage; see `layouts.Layout.to_usd` and `tasks.TaskEnv.to_usd`."""
-    target = Path(path)
-    stage = _Stage(cell, _identifier(target.stem))
+    stage = _Stage(cell, around, _identifier(target.stem))
     for source in cell.sources:
         stage.add_shapes(source, visuals=visuals)
     stage.add_surroundings()
     for standing in cell.robots.values():
         stage.add_robot(standing)
-    for body in cell.bodies:
+    for body in around.bodies:
         stage.add_body(body)
     partial = target.with_name(f"{target.stem}.{os.getpid()}{PARTIAL}{target.suffix}")
     with written_whole(target, partial=partial):
@@ -81,19 +82,19 @@ class _Paths:
 class _Stage:
     """A stage that grows robot by robot."""
 
-    def __init__(self, cell: ExportedCell, name: str) -> None:
+    def __init__(self, cell: ExportedCell, around: Surroundings, name: str) -> None:
         self._cell, self._stage = cell, Usd.Stage.CreateInMemory()
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.z)
         UsdGeom.SetStageMetersPerUnit(self._stage, 1.0)
         UsdPhysics.SetStageKilogramsPerUnit(self._stage, 1.0)
-        note = licence_note((source.robot for source in cell.sources), cell.things)
+        note = licence_note((source.robot for source in cell.sources), around.things)
         self._stage.GetRootLayer().documentation = note
         self._stage.SetMetadata("comment", "lengths in m, z up; see the documentation for licences")
         root = UsdGeom.Xform.Define(self._stage, f"/{name}").GetPrim()
         self._stage.SetDefaultPrim(root)
         self._paths = _Paths(f"/{name}", "scene", "tables", "frames", "surfaces", "bodies")
         self._bodies = _Paths(f"/{name}/bodies", "surfaces")
-        add_scene(self._stage, f"/{name}/scene", cell.gravity)
+        add_scene(self._stage, f"/{name}/scene", around.gravity)
         self._surfaces: dict[Friction, Any] = {}
         library = f"/{name}_shapes"
         self._stage.CreateClassPrim(library)

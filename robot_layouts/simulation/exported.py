@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from layouts.export.bodies import BodyLink, ExportedBody, body_joint
+from layouts.export.bodies import BodyLink, ExportedBody, Surroundings, body_joint
 from layouts.export.cell import ExportedCell
 from layouts.export.files import USD_ENDINGS, expect_ending
 from layouts.export.ros2 import write_ros2
@@ -28,7 +28,7 @@ def write_usd_world(
     target = expect_ending(path, "a USD stage", *USD_ENDINGS)
     from layouts.export.usd import write_usd  # which needs usd-core
 
-    return write_usd(_exported(world, state, things), target)
+    return write_usd(_cell(world, state), target, _around(world, state, things))
 
 
 def write_ros2_world(
@@ -38,19 +38,18 @@ def write_ros2_world(
     things: Iterable[ObjectDescriptor] = (),
 ) -> Path:
     """Write a simulation's first world as a ROS 2 package; see `tasks.TaskEnv.to_ros2`."""
-    return write_ros2(_exported(world, state, things), folder)
+    return write_ros2(_cell(world, state), folder, _around(world, state, things))
 
 
-def _exported(world: World, state: State, things: Iterable[ObjectDescriptor]) -> ExportedCell:
+def _cell(world: World, state: State) -> ExportedCell:
     starts = {place: state.qpos(place)[0].tolist() for place in world.layout}
-    cell = ExportedCell.read(world.layout, visuals=True, starts=starts)
+    return ExportedCell.read(world.layout, visuals=True, starts=starts)
+
+
+def _around(world: World, state: State, things: Iterable[ObjectDescriptor]) -> Surroundings:
     own = (body for body in world.bodies.values() if body.part_of is None)
-    return replace(
-        cell,
-        gravity=world.physics.gravity,
-        bodies=tuple(_body(body, state, world.physics.friction) for body in own),
-        things=tuple(things),
-    )
+    bodies = (_body(body, state, world.physics.friction) for body in own)
+    return Surroundings(tuple(bodies), tuple(things), world.physics.gravity)
 
 
 def _body(body: WorldBody, state: State, friction: Friction) -> ExportedBody:

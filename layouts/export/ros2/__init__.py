@@ -9,6 +9,7 @@ from itertools import product
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
+from layouts.export.bodies import NOTHING, Surroundings
 from layouts.export.cell import BODIES, ExportedCell, RobotSource, Standing
 from layouts.export.files import LICENCES, licence_note, replaced_folder, short_licences
 from layouts.export.meshes import MeshFolder, drawn_meshes, solid_shapes
@@ -43,7 +44,13 @@ SPEEDS = {"rad": 1.0, "m": 0.1}  # per second, of joints whose URDF has no large
 Shapes = dict[str, list[Element]]
 
 
-def write_ros2(cell: ExportedCell, folder: str | os.PathLike[str], *, visuals: bool = True) -> Path:
+def write_ros2(
+    cell: ExportedCell,
+    folder: str | os.PathLike[str],
+    around: Surroundings = NOTHING,
+    *,
+    visuals: bool = True,
+) -> Path:
     """Write a cell as a ROS 2 package; see `layouts.Layout.to_ros2` and `tasks.TaskEnv.to_ros2`."""
     target = Path(folder)
     package = target.absolute().name
@@ -55,7 +62,7 @@ def write_ros2(cell: ExportedCell, folder: str | os.PathLike[str], *, visuals: b
     with replaced_folder(target, _is_own, "save the package under another name") as made:
         for name in ("config", "launch", "meshes", "urdf"):
             (made / name).mkdir()
-        _write(made, cell, package, visuals=visuals)
+        _write(made, cell, around, package, visuals=visuals)
     return target
 
 
@@ -69,8 +76,10 @@ def _proper(package: str) -> str:
     return plain if re.fullmatch(r"[a-z](_?[a-z0-9])+", plain) else f"cell_{plain}".strip("_")
 
 
-def _write(folder: Path, cell: ExportedCell, package: str, *, visuals: bool) -> None:
-    names = RosNames(cell)
+def _write(
+    folder: Path, cell: ExportedCell, around: Surroundings, package: str, *, visuals: bool
+) -> None:
+    names = RosNames(cell, around.bodies)
     groups = PlanningGroups(cell, names)
     robots = [source.robot for source in cell.sources]
     meshes = folder / "meshes"
@@ -85,22 +94,25 @@ def _write(folder: Path, cell: ExportedCell, package: str, *, visuals: bool) -> 
         "disabled": [*_allowed_pairs(cell, names), *_pairs_that_stand(cell, names)],
         "scene": SCENE if names.moved else "",
     }
+    description = _description(cell, names, package, meshes, visuals=visuals)
+    moved: Mapping[str, str] = {}
+    if around.bodies:
+        files, uri = MeshFolder(meshes / BODIES), f"package://{package}/meshes/{BODIES}"
+        description.extend(standing_bodies(around.bodies, names, files, uri))
+        moved = moved_bodies(around.bodies, names, files, uri)
     texts = {
-        f"urdf/{package}.urdf": xml_text(
-            _description(cell, names, package, meshes, visuals=visuals)
-        ),
+        f"urdf/{package}.urdf": xml_text(description),
         f"urdf/{package}.urdf.xacro": _filled("cell.urdf.xacro", content),
         f"config/{package}.srdf": _filled("cell.srdf", content),
         **{f"config/{name}.yaml": _filled(f"{name}.yaml", content) for name in CONFIGS},
         "launch/demo.launch.py": _filled("demo.launch.py", content),
         "package.xml": _filled("package.xml", content),
         "CMakeLists.txt": _filled("CMakeLists.txt", content),
-        LICENCES: licence_note(robots, cell.things),
+        LICENCES: licence_note(robots, around.things),
+        **moved,
     }
-    if names.moved:
-        (folder / "urdf" / "bodies").mkdir()
-        texts |= moved_bodies(cell, names, *_of_bodies(meshes, package))
     for name, written in texts.items():
+        (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(written, encoding="utf-8")
 
 
@@ -162,8 +174,6 @@ def _description(
     }
     for standing in cell.robots.values():
         root.extend(_robot(standing, names, shapes[id(standing.source)]))
-    if names.standing:
-        root.extend(standing_bodies(cell, names, *_of_bodies(meshes, package)))
     for tool in cell.tools:
         link = names.tool(tool)
         SubElement(root, "link", name=link)
@@ -171,11 +181,6 @@ def _description(
         carrier = names.link(tool.place, tool.link)
         root.append(joint_element(names.fixed_joint(link), "fixed", carrier, link, origin_of(pose)))
     return root
-
-
-def _of_bodies(meshes: Path, package: str) -> tuple[MeshFolder, str]:
-    """Return the folder of the meshes of a task's bodies, and its address."""
-    return MeshFolder(meshes / BODIES), f"package://{package}/meshes/{BODIES}"
 
 
 def _speed_of(joint: ModelJoint) -> float:

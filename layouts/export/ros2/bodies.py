@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 import yaml
 
-from layouts.export.bodies import PLANE, BodyJoint, BodyLink, ExportedBody
-from layouts.export.cell import EARTH, ExportedCell
+from layouts.export.bodies import EARTH, PLANE, BodyJoint, BodyLink, ExportedBody
 from layouts.export.meshes import CollisionShape, MeshFolder
 from layouts.export.ros2.elements import (
     collision,
@@ -31,10 +30,10 @@ _ORIGIN = np.zeros(3)
 
 
 def standing_bodies(
-    cell: ExportedCell, names: RosNames, meshes: MeshFolder, uri: str
+    bodies: Iterable[ExportedBody], names: RosNames, meshes: MeshFolder, uri: str
 ) -> Iterator[Element]:
     """Yield links for bodies that nothing moves, fixed to the world, and save their meshes."""
-    for body in cell.bodies:
+    for body in bodies:
         if body.name in names.standing:
             name, (link,) = names.standing[body.name], body.links
             yield _link(link, name, meshes, uri)
@@ -43,24 +42,28 @@ def standing_bodies(
 
 
 def moved_bodies(
-    cell: ExportedCell, names: RosNames, meshes: MeshFolder, uri: str
+    bodies: Iterable[ExportedBody], names: RosNames, meshes: MeshFolder, uri: str
 ) -> Mapping[str, str]:
     """Return the files of bodies that move: a URDF of each, MoveIt's scene, and where they are.
 
+    Without any, there are none.
+
     Args:
-        cell: The cell.
+        bodies: The bodies, those that stand among them.
         names: What everything is called.
         meshes: Where their meshes are saved.
         uri: Of that folder.
     """
     texts, scene, poses = dict[str, str](), ["bodies"], dict[str, object]()
-    for body in cell.bodies:
+    for body in bodies:
         if body.name in names.moved:
             name = names.moved[body.name]
             texts[f"urdf/bodies/{name}.urdf"] = xml_text(_urdf(body, names, meshes, uri))
             poses[name] = _where(body, names)
             for link in body.links:
                 scene.extend(_object(link, names.moved[link.name]))
+    if not poses:
+        return {}
     texts[SCENE] = "\n".join([*scene, ".", ""])
     texts[POSES] = yaml.safe_dump(poses, sort_keys=False, default_flow_style=None, width=10**6)
     return texts

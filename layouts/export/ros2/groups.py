@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from layouts.export.bodies import ExportedBody
 from layouts.export.cell import ExportedCell, ToolPoint
 from layouts.export.files import Names
 from robots.action_split import is_gripper
@@ -24,8 +25,8 @@ class RosNames:
         moved: Of those that collide and may move, and of the parts that joints move.
     """
 
-    def __init__(self, cell: ExportedCell) -> None:
-        """Name everything."""
+    def __init__(self, cell: ExportedCell, bodies: Iterable[ExportedBody] = ()) -> None:
+        """Name everything, and some bodies of a task."""
         links, joints = Names(r"\W"), Names(r"\W")
         links.new(WORLD)
         systems = Names(r"\W")
@@ -40,7 +41,7 @@ class RosNames:
         self._tools = {tool.arm: links.new(f"{tool.arm}_tcp") for tool in cell.tools}
         self.frames = {name: links.new(name) for name in cell.layout.frames}
         roots = [self.link(n, standing.source.model.root) for n, standing in cell.robots.items()]
-        solid = [body for body in cell.bodies if body.collides]
+        solid = [body for body in bodies if body.collides]
         self.standing = {body.name: links.new(body.name) for body in solid if body.stands}
         self.moved = {
             link.name: links.new(link.name)
