@@ -157,7 +157,7 @@ class ExportedBody:
 
 
 @dataclass(frozen=True, eq=False)
-class Surroundings:
+class ExportedWorld:
     """What there is besides robots in a task's world.
 
     Attributes:
@@ -171,7 +171,7 @@ class Surroundings:
     gravity: Vector3 = EARTH
 
 
-NOTHING = Surroundings()
+NOTHING = ExportedWorld()
 
 
 def body_joint(body: str, joint: Joint, carrier: Joint | None, position: float) -> BodyJoint:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from layouts.export.bodies import EARTH, NOTHING, PLANE, BodyLink, ExportedBody, Surroundings
+from layouts.export.bodies import EARTH, NOTHING, PLANE, BodyLink, ExportedBody, ExportedWorld
 from layouts.export.cell import ExportedCell, JointDrive, RobotSource, Standing
 from layouts.export.files import Names, licence_note
 from layouts.export.meshes import CollisionShape, Drawn, drawn_meshes, solid_shapes
@@ -41,7 +41,7 @@ UsdPhysics, UsdShade, Vt = map(_pxr, ("UsdPhysics", "UsdShade", "Vt"))
 
 
 def write_usd(
-    cell: ExportedCell, target: Path, around: Surroundings = NOTHING, *, visuals: bool = True
+    cell: ExportedCell, target: Path, around: ExportedWorld = NOTHING, *, visuals: bool = True
 ) -> Path:
     """Write a cell as a USD stage; see `layouts.Layout.to_usd` and `tasks.TaskEnv.to_usd`."""
     stage = _Stage(cell, around, _identifier(target.stem))
@@ -82,7 +82,7 @@ class _Paths:
 class _Stage:
     """A stage that grows robot by robot."""
 
-    def __init__(self, cell: ExportedCell, around: Surroundings, name: str) -> None:
+    def __init__(self, cell: ExportedCell, around: ExportedWorld, name: str) -> None:
         self._cell, self._stage = cell, Usd.Stage.CreateInMemory()
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.z)
         UsdGeom.SetStageMetersPerUnit(self._stage, 1.0)

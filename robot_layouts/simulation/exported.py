@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from layouts.export.bodies import BodyLink, ExportedBody, Surroundings, body_joint
+from layouts.export.bodies import BodyLink, ExportedBody, ExportedWorld, body_joint
 from layouts.export.cell import ExportedCell
 from layouts.export.files import USD_ENDINGS, expect_ending
 from layouts.export.ros2 import write_ros2
@@ -46,10 +46,10 @@ def _cell(world: World, state: State) -> ExportedCell:
     return ExportedCell.read(world.layout, visuals=True, starts=starts)
 
 
-def _around(world: World, state: State, things: Iterable[ObjectDescriptor]) -> Surroundings:
+def _around(world: World, state: State, things: Iterable[ObjectDescriptor]) -> ExportedWorld:
     own = (body for body in world.bodies.values() if body.part_of is None)
     bodies = (_body(body, state, world.physics.friction) for body in own)
-    return Surroundings(tuple(bodies), tuple(things), world.physics.gravity)
+    return ExportedWorld(tuple(bodies), tuple(things), world.physics.gravity)
 
 
 def _body(body: WorldBody, state: State, friction: Friction) -> ExportedBody:

@@ -9,7 +9,7 @@ from itertools import product
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from layouts.export.bodies import NOTHING, Surroundings
+from layouts.export.bodies import NOTHING, ExportedWorld
 from layouts.export.cell import BODIES, ExportedCell, RobotSource, Standing
 from layouts.export.files import LICENCES, licence_note, replaced_folder, short_licences
 from layouts.export.meshes import MeshFolder, drawn_meshes, solid_shapes
@@ -47,7 +47,7 @@ Shapes = dict[str, list[Element]]
 def write_ros2(
     cell: ExportedCell,
     folder: str | os.PathLike[str],
-    around: Surroundings = NOTHING,
+    around: ExportedWorld = NOTHING,
     *,
     visuals: bool = True,
 ) -> Path:
@@ -77,7 +77,7 @@ def _proper(package: str) -> str:
 
 
 def _write(
-    folder: Path, cell: ExportedCell, around: Surroundings, package: str, *, visuals: bool
+    folder: Path, cell: ExportedCell, around: ExportedWorld, package: str, *, visuals: bool
 ) -> None:
     names = RosNames(cell, around.bodies)
     groups = PlanningGroups(cell, names)
