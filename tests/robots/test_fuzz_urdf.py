@@ -59,6 +59,11 @@ def encoded(text: str) -> bytes:
 @example(URDF.replace('multiplier="2"', 'multiplier="0"'))
 @example(URDF.replace('ixx="0.1"', 'ixx="1e-300"'))
 @example(URDF.replace(BOX, "<box/>"))
+@example(
+    URDF.replace('xyz="0 0 0" rpy="0 0 0"/><mass', 'xyz="0 0" rpy="0 0 0"/><mass').replace(
+        "<box", "<ox"
+    )
+)
 def test_damaged_urdfs(text):
     assert read({"toy.urdf": encoded(text)})
 

@@ -287,6 +287,8 @@ def _corners(element: Element, where: str, urdf: str) -> Floats | None:
 
     from robot_layouts.kinematics.rotations import rpy_pose
 
+    if any(shape.tag not in SIZES for shape in element.iterfind("geometry/*")):
+        return None  # which is refused, or left out, when shapes are read
     try:
         own = _own_corners(element, where, urdf)
         origin = element.find("origin")
