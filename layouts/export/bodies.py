@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
-from typing import Any
 
 import numpy as np
 
 from layouts.export.cell import JointDrive
-from layouts.export.meshes import AS_HULLS, CollisionShape, Drawn
+from layouts.export.meshes import AS_HULLS, CollisionShape, Drawn, hull_of
 from layouts.visuals import Rgba, Visual, load_meshes, mean_color, shown_color, simplified
 from objects import ObjectDescriptor
 from objects.joints import Joint
@@ -28,7 +27,6 @@ from objects.shapes import (
 from objects.solids import inertia_of, mass_of, pieces, surface
 from robot_layouts.kinematics.quaternions import multiplied
 from robot_layouts.kinematics.rotations import Floats, pose_matrix
-from robots import AssetError
 from robots.descriptor import Vector3
 from robots.urdf.mesh_files import read_corners
 from robots.urdf.model import LinkInertia, ModelJoint, UrdfShape
@@ -65,6 +63,11 @@ class BodyLink:
     name: str
     pose: Floats
     shapes: tuple[Shape, ...]
+
+    @property
+    def collides(self) -> bool:
+        """Whether anything of it does."""
+        return any(shape.collides for shape in self.shapes)
 
     def framed_at(self, place: Floats) -> BodyLink:
         """Return it with its frame at a place of that frame, (3,) (m)."""
@@ -153,7 +156,7 @@ class ExportedBody:
     @property
     def collides(self) -> bool:
         """Whether anything of it does."""
-        return any(shape.collides for link in self.links for shape in link.shapes)
+        return any(link.collides for link in self.links)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +226,7 @@ def _solids(shape: Shape, hulls: Sequence[str]) -> Iterator[CollisionShape]:
     elif isinstance(shape, Mesh) and shape.collision != "hull":
         yield from _mesh_solids(shape, own)
     else:
-        yield CollisionShape(own, _hull(surface(shape).corners, name))
+        yield CollisionShape(own, hull_of(surface(shape).corners, name))
 
 
 def _mesh_solids(mesh: Mesh, own: UrdfShape) -> Iterator[CollisionShape]:
@@ -238,16 +241,7 @@ def _mesh_solids(mesh: Mesh, own: UrdfShape) -> Iterator[CollisionShape]:
         return
     turn, place = own.origin[:3, :3], own.origin[:3, 3]
     for corners in pieces(file, mesh.scale):
-        yield CollisionShape(own, _hull(corners @ turn.T + place, file))
-
-
-def _hull(corners: Floats, where: str) -> Any:
-    import trimesh
-
-    try:
-        return trimesh.convex.convex_hull(corners)
-    except Exception as error:  # qhull's own, for what is all but flat
-        raise AssetError(f"{where}: a collision shape without a volume") from error
+        yield CollisionShape(own, hull_of(corners @ turn.T + place, file))
 
 
 def _drawn(shape: Shape) -> Iterator[Visual]:

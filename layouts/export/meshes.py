@@ -98,22 +98,32 @@ def solid_shapes(
     """
     return {
         link: tuple(
-            CollisionShape(shape, _hull(shape, source) if shape.kind in hulls else None)
+            CollisionShape(
+                shape,
+                hull_of(shape_corners(shape, source.urdf), shape.where)
+                if shape.kind in hulls
+                else None,
+            )
             for shape in shapes
         )
         for link, shapes in source.model.collisions.items()
     }
 
 
-def _hull(shape: UrdfShape, source: RobotSource) -> Any:
+def hull_of(corners: Any, where: str) -> Any:
+    """Return the convex hull of points, (n, 3) (m), a trimesh.
+
+    Raises:
+        AssetError: If it has no volume; ``where`` says of what.
+        MissingPackageError: If scipy is not installed.
+    """
     import trimesh
 
-    corners = shape_corners(shape, source.urdf)
     optional("scipy", "convex hulls need scipy", "checks")
     try:
         return trimesh.convex.convex_hull(corners)
     except Exception as error:  # qhull's own, for what is all but flat
-        raise AssetError(f"{shape.where}: a collision shape without a volume") from error
+        raise AssetError(f"{where}: a collision shape without a volume") from error
 
 
 class MeshFolder:

@@ -13,7 +13,7 @@ import yourdfpy
 
 import tasks
 from layouts import single
-from objects.shapes import Plane
+from objects.shapes import Mesh, Plane
 from objects.solids import mass_of, surface
 from robot_layouts.__main__ import main
 from robot_layouts.kinematics.rotations import pose_matrix, transform
@@ -297,6 +297,27 @@ def test_what_stands_is_in_the_cell_and_robots_are_where_they_were(exported):
 def plane_height(body, pose):
     (plane,) = (shape for shape in body.shapes if isinstance(shape, Plane))
     return plane.position[2] + pose[2]
+
+
+def test_what_is_held_needs_no_mass_and_may_be_a_bare_surface(tmp_path):
+    corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    sheet = trimesh.Trimesh(corners, [(0, 1, 2), (0, 2, 3)])
+    sheet.export(tmp_path / "sheet.stl")
+
+    @register_task("TestSheet-v1")
+    class _Sheet(ShutLaptop):
+        def build(self, world):
+            """Add a sheet that the task moves."""
+            super().build(world)
+            mesh = Mesh(tmp_path / "sheet.stl", collision="surface")
+            world.add("sheet", mesh, kind="kinematic", position=(0.0, 2.0, 0.0))
+
+    env = tasks.make("TestSheet-v1")
+    env.reset(seed=0)
+    package = env.to_ros2(tmp_path / PACKAGE)
+    urdf = read_urdf(package / "urdf" / "bodies" / "sheet.urdf", package)
+    assert urdf.link_map["sheet"].inertial is None
+    assert solid_boxes(urdf, np.eye(4))["sheet"].tolist() == [[0, 2, 0], [1, 3, 1]]
 
 
 def test_the_command_writes_packages(tmp_path, capsys):

@@ -83,7 +83,8 @@ def _urdf(body: ExportedBody, names: RosNames, meshes: MeshFolder, uri: str) -> 
     links = {link.name: link.framed_at(anchors.get(link.name, _ORIGIN)) for link in body.links}
     for link in links.values():
         made = _link(link, names.moved[link.name], meshes, uri)
-        made.insert(0, inertial(link.inertia))
+        if (body.moves or link.name != body.name) and link.collides:
+            made.insert(0, inertial(link.inertia))
         root.append(made)
     for own in body.joints:
         before = anchors.get(own.model.parent, _ORIGIN)
