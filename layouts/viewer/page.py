@@ -137,7 +137,7 @@ class CellPage:
                     lambda event, overlay=overlay: self.scene.show(overlay, event.target.value)
                 )
             if self._cell.ways:
-                box = gui.add_checkbox("Ways", True)
+                box = gui.add_checkbox("Paths", True)
                 box.on_update(lambda event: self.scene.show_ways(event.target.value))
         for name in self._cell.layout:
             self._build_robot(gui, name)

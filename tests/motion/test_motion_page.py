@@ -52,9 +52,9 @@ def test_a_motion_is_scrubbed_and_played(tmp_path):
         timeline.press("End")
         page.get_by_text("step 30 of 30, 1.00 s").wait_for()
         end = settled(page, lambda now: changed(now, start) > 500)
-        page.get_by_role("checkbox", name="Intervals").click()
+        page.get_by_role("checkbox", name="Paths").click()
         settled(page, lambda now: coloured(now, BLUE) < coloured(end, BLUE) / 2)
-        page.get_by_role("checkbox", name="Intervals").click()
+        page.get_by_role("checkbox", name="Paths").click()
         page.get_by_label("Play").click()
         page.get_by_text("step 30 of 30, 1.00 s").wait_for(state="hidden")
         at = urlsplit(view.url).netloc
