@@ -29,12 +29,18 @@ from tasks import TaskEnv
 from tasks.cells.hold_gate import LONG, THICK, CellHoldGate
 
 PULLS = 10  # in how many parts the leaf is pulled open
-TRIED = ((6, 1.5), (9, 1.5), (9, 1.3))  # parts of the bar's way; how wide the leaf opens (rad)
+# Parts of the bar's way, how wide the leaf opens (rad), how far before the gate the bar's middle is
+# when it is handed on, and how far from there it is held (m).
+TRIED = (
+    (6, 1.5, 0.02, LONG - 0.05),
+    (9, 1.5, 0.02, LONG - 0.05),
+    (9, 1.3, 0.02, LONG - 0.05),
+    (9, 1.3, -0.04, LONG / 2),
+)
 AWAY = np.array([0.4, 0.0, 0.3])  # where the giver goes in the end, from its base (m)
 LEVEL = pi / 2 + 0.01  # rad; of a hand that pulls at the handle, with room for rounding
 BEFORE = 0.18  # m; of a hand from the handle, before it goes straight there
-HELD = LONG - 0.05  # where along the bar it is held (m)
-START, END, OUT = 0.32, 0.02, -0.32  # of the bar's middle before the gate and behind it (m)
+START, OUT = 0.32, -0.32  # of the bar's middle before the gate and behind it (m)
 ASIDE, UP = 0.04, 0.01  # of the bar on its way, from the middle of the gate, and lifted (m)
 
 
@@ -50,9 +56,9 @@ def hold_gate(task: TaskEnv, seed: int) -> Plan:
     )
 
 
-def _script(task: TaskEnv, count: int, wide: float) -> Script:
-    above, *others = pick("taker", "bar", partial(_grips, side=-HELD), ready=0.03, around=0.01)
-    first, *then = pick("giver", "bar", partial(_grips, side=HELD), ready=0.03, around=0.01)
+def _script(task: TaskEnv, count: int, wide: float, end: float, held: float) -> Script:
+    above, *others = pick("taker", "bar", partial(_grips, side=-held), ready=0.03, around=0.01)
+    first, *then = pick("giver", "bar", partial(_grips, side=held), ready=0.03, around=0.01)
     opened, handed = f"porter.gate.leaf {PULLS - 1}", f"giver.there {count - 1}"
     return {
         "porter": _holding(task, wide, ["taker.over", "giver.leave"]),
@@ -61,7 +67,7 @@ def _script(task: TaskEnv, count: int, wide: float) -> Script:
             *then,
             Waypoint("lift", partial(_raised, robot="giver", by=UP), CLOSED),
             *_along("giver", "before", START, 1),
-            *_along("giver", "there", END, count),
+            *_along("giver", "there", end, count),
             Waypoint("release", None, OPEN, steps=3, after=("taker.grasp bar",)),
             Waypoint("back", _backed, OPEN),
             Waypoint("rise", partial(_raised, robot="giver", by=0.1), OPEN),
