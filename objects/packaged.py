@@ -73,24 +73,30 @@ class PackagedObject:
             number = checked_whole(f"{self.name}: seed", seed, 0, None, DescriptorError)
         file = self.file.format(number % self.members)
         path = UrdfLocator(self.package, file).locate(pictures=True)
-        origin = load_manifest().package(self.package).origin
-        given: dict[str, Any] = {
-            "about": self.about,
-            "source": f"{origin.wheel}, {file}",
-            "licence": origin.licence,
-            "most_grasps": most_grasps,
-            **self.details,
-        }
-        known = measurements().get(self.name) if measured and self.members == 1 else None
-        if known:
-            rests = {name: tuple(turn) for name, turn in known["rests"].items()}
-            grasps = tuple(_grasp(row) for row in known["grasps"])
-            given |= {"rests": rests, "grasps": grasps}
-        if file.endswith(".xml"):
-            thing = ObjectDescriptor.from_mjcf(path, self.name, **given)
-        else:
-            thing = ObjectDescriptor.from_mesh(path, self.name, **given)
+        thing = _made(self, path, file, measured, most_grasps)
         return thing if seed is None else replace(thing, seed=seed)
+
+
+@lru_cache(maxsize=256)  # what `locate` finds is as the manifest says, every time
+def _made(
+    thing: PackagedObject, path: Path, file: str, measured: bool, most_grasps: int
+) -> ObjectDescriptor:
+    origin = load_manifest().package(thing.package).origin
+    given: dict[str, Any] = {
+        "about": thing.about,
+        "source": f"{origin.wheel}, {file}",
+        "licence": origin.licence,
+        "most_grasps": most_grasps,
+        **thing.details,
+    }
+    known = measurements().get(thing.name) if measured and thing.members == 1 else None
+    if known:
+        rests = {name: tuple(turn) for name, turn in known["rests"].items()}
+        grasps = tuple(_grasp(row) for row in known["grasps"])
+        given |= {"rests": rests, "grasps": grasps}
+    if file.endswith(".xml"):
+        return ObjectDescriptor.from_mjcf(path, thing.name, **given)
+    return ObjectDescriptor.from_mesh(path, thing.name, **given)
 
 
 def _grasp(row: list[Any]) -> Grasp:

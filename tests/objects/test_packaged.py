@@ -102,6 +102,7 @@ def test_a_path_is_a_thing_where_names_are(tmp_path, monkeypatch, capsys):
 def test_it_stands_and_its_grasps_hold(name):
     thing = loaded(name)
     assert isinstance(thing, ObjectDescriptor)
+    assert loaded(name) is thing  # its file is read once
     assert thing.licence == PACKAGED[name].licence
     assert [seen.problem for seen in try_rests([thing]) if seen.problem] == []
     tried = try_thing_grasps(thing, 0.1)
