@@ -29,8 +29,9 @@ from tasks import TaskEnv
 from tasks.cells.hold_gate import LONG, THICK, CellHoldGate
 
 PULLS = 10  # in how many parts the leaf is pulled open
-USUAL = 0.02, LONG - 0.05  # m: from gate to the bar's middle when handed on, from there to hands
-# Parts of the bar's way, how wide the leaf opens (rad), and that; the last where it is far to go.
+USUAL = 0.02, LONG - 0.05
+# Each: in how many parts the bar moves; how wide the leaf opens (rad); how far before the gate the
+# bar's middle is when it changes hands, and how far from its middle it is held (m).
 TRIED = ((6, 1.5, *USUAL), (9, 1.5, *USUAL), (9, 1.3, *USUAL), (9, 1.3, -0.04, LONG / 2))
 AWAY = np.array([0.4, 0.0, 0.3])  # where the giver goes in the end, from its base (m)
 LEVEL = pi / 2 + 0.01  # rad; of a hand that pulls at the handle, with room for rounding
