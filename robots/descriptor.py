@@ -144,7 +144,8 @@ class RobotDescriptor:
         urdf: Where its files come from.
         action_split: Its joint groups, in action order.
         tcp_link: Link whose frame orients the tool centre point.
-        keyframes: Named joint positions, in the order of ``joints`` (rad, m).
+        keyframes: Named joint positions, in the order of ``joints`` (rad, m). In ``pinch`` the
+            fingers of a hand of many joints meet; at home it is open.
         source: Where the numbers of this descriptor come from.
         reach: Largest distance of the TCP from the base axis (m).
         tcp_position_links: Links whose mean origin is the TCP position; ``tcp_link`` if empty.

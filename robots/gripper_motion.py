@@ -17,6 +17,7 @@ from robot_layouts.kinematics.tree import FIXED, Tree
 from robots.action_split import JointGroup, is_gripper
 from robots.bodies.hulls import shape_corners
 from robots.descriptor import RobotDescriptor
+from robots.parts import PINCH
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import model_of
 from robots.urdf.tcp import find_tcp
@@ -29,6 +30,7 @@ SHARES = np.linspace(0.0, 1.0, 65)  # at which openings are worked out
 _LEAST_WORK = 1e-9  # J; of drives that have no stiffness
 _SLIDES = 1e-6  # rad; fingers that turn less against each other slide
 _TOUCH = 2e-3  # m; jaws that are less deep in each other when closed, or less far apart, touch
+_SLIGHT = 0.1  # of the longest way of a joint; those that go less say little of how far it is open
 _AJAR = 8  # number of the share at which the pads' way is seen
 
 
@@ -38,7 +40,8 @@ class GripperMotion:
     Each finger's pad is where the TCP lies when the gripper is closed: there fingers meet, but for
     jaws that slide and whose shapes are then inside each other, or apart: those meet before, or
     never. How far a gripper is open is given as a share, 0 where the action number -1 drives it,
-    or closes it as far as its joints go, and 1 where the number 1 does.
+    or closes it as far as its joints go, and 1 where the number 1 does; of a hand whose descriptor
+    has the keyframe `pinch` 0 there, and 1 at home.
 
     Attributes:
         joints: Names of the gripper's joints.
@@ -139,7 +142,8 @@ class GripperMotion:
 
     def share_at(self, positions: Floats) -> float:
         """Return how far the gripper is open with its joints at some positions (rad, m)."""
-        moves = self._travels != 0
+        travels = np.abs(self._travels)
+        moves = travels > _SLIGHT * travels.max()
         return float(np.mean((positions - self._ends[:, 0])[moves] / self._travels[moves]))
 
     def positions(self, share: float) -> Floats:
@@ -216,7 +220,11 @@ def ends_of(group: JointGroup, limits: Floats, robot: RobotDescriptor) -> Floats
         limits: Of the robot's joints, in the descriptor's order, (dof, 2) (rad, m).
         robot: The robot.
     """
-    own = limits[[robot.joints.index(joint) for joint in group.joints]]
+    places = [robot.joints.index(joint) for joint in group.joints]
+    own = limits[places]
+    if PINCH in robot.keyframes:
+        ends = [robot.keyframe(name) for name in (PINCH, robot.home.keyframe)]
+        return np.array(ends, float)[:, places].T
     if group.delta or group.target or group.command != "position":
         return own
     ranges = np.array(group.ranges, float)

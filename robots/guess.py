@@ -28,8 +28,8 @@ from robots.guessing.groups import arm_groups, held_groups
 from robots.guessing.hints import NOTHING, Hints, known_anatomy, known_tip, renamed
 from robots.guessing.posture import Posture, PostureSearch
 from robots.guessing.stance import Stance
-from robots.guessing.tool import BETWEEN, EXACT, Tool, find_base, find_reach, find_tool
-from robots.parts import Fingers, Limb, Vector3
+from robots.guessing.tool import BETWEEN, EXACT, Tool, at_pinch, find_base, find_reach, find_tool
+from robots.parts import PINCH, Fingers, Limb, Vector3
 from robots.urdf.cleaning.xacro_files import expand, template_of
 from robots.urdf.model import UrdfModel
 from robots.urdf.reading import read_model
@@ -208,9 +208,12 @@ def _look_at(
         )
         for limb in anatomy.limbs
     }
+    grippers = {limb.name: find_gripper(limb, tips[limb.name], drives) for limb in hands}
+    for name, gripper in grippers.items():
+        if gripper.pinch is not None:
+            tools[name] = at_pinch(tools[name], stance, gripper.pinch.place)
     main = anatomy.limbs[0].name
     tools[main] = _given_tool(tools[main], overrides)
-    grippers = {limb.name: find_gripper(limb, tips[limb.name], drives) for limb in hands}
     return _Parts(model, stance, anatomy, hulls, drives, tips, tools, grippers, hints)
 
 
@@ -274,8 +277,11 @@ def _below_ground(parts: _Parts, rest: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def _fingers(parts: _Parts, limb: LimbJoints) -> tuple[Fingers | None, str]:
-    postures = parts.grippers[limb.name].postures if limb.fingers else ()
-    return find_fingers(limb, parts.tips.get(limb.name), postures)
+    if not limb.fingers:
+        return find_fingers(limb, None, ())
+    gripper = parts.grippers[limb.name]
+    known = gripper.pinch.ends if gripper.pinch else None
+    return find_fingers(limb, parts.tips[limb.name], gripper.closing, known)
 
 
 def _limbs(parts: _Parts, rest: Mapping[str, float]) -> dict[str, Limb]:
@@ -431,6 +437,10 @@ def _keyframes(
     """Return the posture to rest in, and those that are known by name."""
     spans = {joint.name: joint.span for joint in parts.model.moving}
     found = {"rest": tuple(rest[joint] for joint in split.joints)}
+    pinches = [gripper.pinch.joints for gripper in parts.grippers.values() if gripper.pinch]
+    if pinches:
+        at = {**rest} | {joint: x for pinch in pinches for joint, x in pinch.items()}
+        found[PINCH] = tuple(at[joint] for joint in split.joints)
     for name, joints in _postures(parts).items():
         at = {**rest, **{j: min(max(x, spans[j][0]), spans[j][1]) for j, x in joints.items()}}
         found.setdefault(name, tuple(at[joint] for joint in split.joints))

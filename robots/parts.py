@@ -18,6 +18,7 @@ Vector3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # wxyz
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
+PINCH = "pinch"  # keyframe in which a thumb and a finger meet, of hands of many joints
 OWN_Y: Vector3 = (0.0, 1.0, 0.0)
 
 _Owners = dict[str, str | None]

@@ -153,6 +153,29 @@ def overlapping(hulls: Sequence[Hull], poses: Floats, pairs: ArrayLike) -> NDArr
     )
 
 
+def contact(hulls: Sequence[Hull], poses: Floats, pairs: ArrayLike) -> Floats | None:
+    """Return the middle of where pairs of hulls touch, (3,) (m); None if none of them do.
+
+    Args:
+        hulls: Hulls of one robot.
+        poses: Of its links, (links, 4, 4) (m).
+        pairs: Indices of two hulls each, (pairs, 2).
+    """
+    import fcl
+
+    request, places = fcl.CollisionRequest(enable_contact=True), list[Floats]()
+    for pair in np.array(pairs, int).reshape(-1, 2).tolist():
+        one, other = (
+            fcl.CollisionObject(hulls[i].geometry, fcl.Transform(pose[:3, :3], pose[:3, 3]))
+            for i in pair
+            for pose in (poses[hulls[i].link],)
+        )
+        result = fcl.CollisionResult()
+        fcl.collide(one, other, request, result)
+        places += [np.array(found.pos) for found in result.contacts]
+    return np.mean(places, axis=0) if places else None
+
+
 def _in_order(pairs: Iterable[LinkPair], model: UrdfModel) -> tuple[tuple[str, str], ...]:
     """Return pairs of links that collide with something, ordered as the links of the URDF are."""
     place = {link: i for i, link in enumerate(model.links)}

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 
 import numpy as np
 
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, transform
 from robots.bodies.hulls import Hull
+from robots.bodies.overlaps import contact
 from robots.guessing import words
 from robots.guessing.anatomy import LimbJoints
 from robots.guessing.doubt import Doubt
@@ -87,6 +89,31 @@ class Fingertips:
         links = [self.stance.tree.link(end) for end in self.ends]
         points = np.array([self._tips[end] for end in self.ends])
         return transform(poses[links], transform(inverse_pose(self._poses[links]), points))
+
+    def gaps(self, ends: Sequence[str], postures: Floats) -> Floats:
+        """Return the way from one tip to another in some postures, (postures, 3) (m)."""
+        one, other = self._pair(ends, postures).transpose(1, 0, 2)
+        return other - one
+
+    def _pair(self, ends: Sequence[str], postures: Floats) -> Floats:
+        """Return two tips in some postures, in the root's frame, (postures, 2, 3) (m)."""
+        which = [self.ends.index(end) for end in ends]
+        return np.array([self._places(poses)[which] for poses in self.stance.poses(postures)])
+
+    def contact(self, ends: Sequence[str], posture: Floats) -> Floats | None:
+        """Return where two ends touch in a posture, root's frame, (3,) (m); None if apart."""
+        links = self.stance.tree.links
+        one, other = (
+            [i for i, hull in enumerate(self._hulls) if links[hull.link] in rigid]
+            for rigid in map(self.stance.model.rigid_with, ends)
+        )
+        poses = self.stance.poses(posture)[0]
+        return contact(self._hulls, poses, list(product(one, other)))
+
+    def moved_by(self, joint: ModelJoint, end: str) -> bool:
+        """Tell whether a joint, or one that follows it, moves an end."""
+        path = self.stance.model.path_to(end)
+        return any(joint.name in (on.name, on.mimics) for on in path)
 
     def touching(self, end: str) -> str:
         """Return the link that touches what a finger holds: of those rigid with ``end`` the last.
@@ -230,7 +257,10 @@ def find_material(model: UrdfModel, limbs: Sequence[LimbJoints]) -> GripperMater
 
 
 def find_fingers(
-    limb: LimbJoints, tips: Fingertips | None, postures: Sequence[Mapping[str, float]]
+    limb: LimbJoints,
+    tips: Fingertips | None,
+    postures: Sequence[Mapping[str, float]],
+    known: tuple[str, str] | None = None,
 ) -> tuple[Fingers | None, str]:
     """Return the two links that grasp, if a limb has two fingers or a thumb, and why.
 
@@ -238,8 +268,9 @@ def find_fingers(
         limb: The limb.
         tips: The tips of its fingers, if it has any.
         postures: Where its joints are, open first, then less and less (rad, m).
+        known: The last links of the two that grasp, if they are known.
     """
-    ends = (tips.grasping() or tips.opposed(postures)) if tips else None
+    ends = known or ((tips.grasping() or tips.opposed(postures)) if tips else None)
     which = f"{limb.name} fingers".lstrip()
     if tips is None or ends is None:
         return None, Doubt(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,7 @@ from robots.guessing.drives import (
 )
 from robots.guessing.fingertips import Fingertips
 from robots.guessing.groups import by_steps, held_still, name_of
+from robots.guessing.pinch import Pinch, find_pinch
 from robots.guessing.stance import Stance, middle_of
 from robots.urdf.model import ModelJoint
 
@@ -69,11 +70,24 @@ class Gripper:
         groups: Joint groups by name.
         postures: Where its joints are, wide open first, then less and less (rad, m).
         reasons: One sentence each.
+        pinch: How two fingers meet whose joints are driven each on its own; None of others.
     """
 
     groups: Mapping[str, JointGroup]
     postures: tuple[Mapping[str, float], ...]
     reasons: tuple[str, ...]
+    pinch: Pinch | None = None
+
+    @property
+    def closing(self) -> tuple[Mapping[str, float], ...]:
+        """Where its joints are as it closes, wide open first (rad, m)."""
+        if self.pinch is None:
+            return self.postures
+        wide, shut = self.postures[0], self.pinch.joints
+        return tuple(
+            {**wide, **{j: part * wide[j] + (1 - part) * at for j, at in shut.items()}}
+            for part in OPENINGS
+        )
 
 
 def find_gripper(limb: LimbJoints, tips: Fingertips, drives: Drives) -> Gripper:
@@ -106,7 +120,8 @@ def _with_idle(name: str, idle: Sequence[ModelJoint], driven: Gripper, drives: D
     """Return a hand that also has joints which move no finger, such as a motor's shaft."""
     held = held_still(f"{name}_idle", idle, drives)
     reason = f"{name}, held still: {_listing(idle)}, by which no finger tip moves"
-    return Gripper({**driven.groups, **held}, driven.postures, (*driven.reasons, reason))
+    groups, reasons = {**driven.groups, **held}, (*driven.reasons, reason)
+    return replace(driven, groups=groups, reasons=reasons)
 
 
 def _driven(
@@ -350,7 +365,11 @@ def _many(
             value = part * middle_of(joint) + (1 - part) * (low + high) / 2
             value = min(max(value, low + OFF * (high - low)), high - OFF * (high - low))
             postures[-1].update(_led_to(followers[joint.name], value))
-    return Gripper(groups, tuple(postures), (f"{name}: {counts}",))
+    pinch = find_pinch(tips, postures, leaders)
+    if pinch is not None:
+        led = (_led_to(followers[joint], at) for joint, at in pinch.joints.items())
+        pinch = replace(pinch, joints={joint: at for joints in led for joint, at in joints.items()})
+    return Gripper(groups, tuple(postures), (f"{name}: {counts}",), pinch)
 
 
 def _led_to(followers: Sequence[MimicJoint], lead: float) -> dict[str, float]:

@@ -24,6 +24,7 @@ from robots.urdf.tree import kinematic_tree
 BETWEEN = 0.05  # m; a frame named like a tool counts if it is so near to the place between tips
 EXACT = 0.02  # m; farther away, the reason says so
 CLOSE = 0.01  # m; the farthest that a TCP may be from the place between two tips that are known
+MEETING = 4e-3  # m; the farthest that it may be from where two fingers of a hand meet
 BLIND = (*words.HEAD, "optical", "imu", "ft", "force", "torque", "inertia", "range", "led")
 STARTS = 8  # of the search for the reach
 
@@ -82,6 +83,22 @@ def find_tool(
     if tips is None:
         return _end(stance, limb, rigid, which)
     return _between(stance, limb, rigid, tips, which, between)
+
+
+def at_pinch(tool: Tool, stance: Stance, place: Floats) -> Tool:
+    """Return a tool centre point that is where fingers meet: itself, or at an offset from its link.
+
+    Args:
+        tool: The tool centre point.
+        stance: The robot.
+        place: Where they meet, in the root's frame, as the robot stands mid-range, (3,) (m).
+    """
+    off = float(np.linalg.norm(tool.on(stance.tree).places(stance.poses(stance.middle))[0] - place))
+    if off <= MEETING:
+        return tool
+    which = tool.reason.partition(":")[0]
+    reason = f"{which}: {off * 100:.0f} cm from there, where two fingers meet: {tool.reason}"
+    return Tool(tool.link, (), reason, _seen_from(stance, tool.link, place))
 
 
 def _missed(stance: Stance, tips: Fingertips, link: str) -> tuple[float, Vector3]:

@@ -20,9 +20,11 @@ from layouts.shared_place import shared_place, working_factors
 from robot_layouts.simulation.framed import AS_DECLARED, Fit
 from robots import DescriptorError, RobotDescriptor, TaskError
 from robots.gripper_motion import gripper_motion
+from robots.parts import PINCH
 
 _ROOM = 0.04  # m that a declaration for a Panda needs about its origin, in reach of all arms
 _HELD = 0.75  # of a gripper's opening that a body to be held may take
+_PINCHED = 0.4  # the same between finger tips that meet, which are round and may turn
 _SPLAYED = 0.28  # rad; between jaws that are turned more a body is held by its edges, and slips out
 _LARGEST, _SMALLEST = 3.0, 0.05
 _DIGITS = 3  # of places and turns: bases are rounded, too
@@ -131,4 +133,6 @@ def _opening(robot: RobotDescriptor) -> float | None:
 def _holds(robot: RobotDescriptor) -> float:
     """Return the width of the widest body that a gripper holds well (m)."""
     motion = gripper_motion(robot)
+    if PINCH in robot.keyframes:
+        return _PINCHED * motion.widest
     return min(_HELD * motion.widest, motion.widest_within(_SPLAYED))

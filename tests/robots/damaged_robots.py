@@ -130,6 +130,10 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         with_tip(INERTIAL + SHAPE + "<collision/>"),
         ("link 'tip': a collision without a shape, left out",),
     ),
+    "a safety zone": (
+        with_tip(INERTIAL + SHAPE).replace("tip", "safety_box"),
+        ("link 'safety_box': its shape left out, as it is a safety zone and not a body",),
+    ),
     "a box without size": (
         with_tip(shape('<box size="0 0 0"/>')),
         ("link 'tip': a collision of a box with size='0 0 0', which has no volume, left out",),

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from robots import ActionSplit, DescriptorError, RobotDescriptor, RobotRegistry
+from robots.from_urdf import guess_descriptor
 from robots.gripper_motion import SHARES, aiming_joints, gripper_motion
+from robots.parts import PINCH
 
 
 def load(name: str) -> RobotDescriptor:
@@ -48,6 +50,18 @@ def test_a_share_gives_the_opening_that_was_asked_for(name: str):
     assert opening <= at < opening + motion.widest / 50
     assert motion.share_at(motion.positions(share)) == pytest.approx(share)
     assert motion.share(2 * motion.widest) == 1.0
+
+
+def test_fingers_of_many_joints_close_until_thumb_and_finger_meet():
+    """The tips part as all joints go from the keyframe `pinch` back to where the hand is open."""
+    robot = guess_descriptor(load("fixed_inspire_hand_left").urdf.locate()).descriptor
+    motion = gripper_motion(robot)
+    for share, name in ((0.0, PINCH), (1.0, "rest")):
+        at = dict(zip(robot.joints, robot.keyframe(name), strict=True))
+        assert motion.positions(share) == pytest.approx([at[joint] for joint in motion.joints])
+    assert motion.openings[0] == pytest.approx(0.0)
+    assert (np.diff(motion.openings) > 0).all()
+    assert motion.widest > 0.05  # m
 
 
 def test_sliding_fingers_keep_their_middle_and_a_swinging_jaw_moves_it():

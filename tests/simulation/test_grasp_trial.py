@@ -8,6 +8,7 @@ import pytest
 
 from robot_layouts.simulation.checks.grasp import try_grasps
 from robots import RobotRegistry
+from robots.from_urdf import guess_descriptor
 from tests.simulation.test_trial import driven
 
 PANDA = RobotRegistry.load("panda")
@@ -44,6 +45,23 @@ def test_a_drive_that_is_too_weak_grasps_nothing():
 
 def test_a_robot_without_a_gripper():
     assert list(try_grasps(RobotRegistry.load("panda_stick"))) == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "fixed_inspire_hand_left",
+        *(
+            pytest.param(name, marks=pytest.mark.long)
+            for name in ("ability_hand_left", "ability_hand_right", "allegro_hand_right", "dclaw")
+        ),
+    ],
+)
+def test_a_hand_that_is_guessed_closes_thumb_and_finger_on_a_cube(name: str):
+    """Each joint of it is driven alone, and nothing says which way closes it."""
+    (seen,) = try_grasps(guess_descriptor(RobotRegistry.load(name).urdf.locate()).descriptor)
+    assert seen.problem is None
+    assert seen.tcp_off < 1e-3  # m
 
 
 @pytest.mark.long

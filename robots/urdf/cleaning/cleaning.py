@@ -18,7 +18,7 @@ from xml.etree.ElementTree import Element, tostring
 
 from robot_layouts.core.errors import AssetError
 from robots.urdf.checks import link_of
-from robots.urdf.cleaning.links import fill_ends, repair_inertia, repair_shapes
+from robots.urdf.cleaning.links import drop_zones, fill_ends, repair_inertia, repair_shapes
 from robots.urdf.cleaning.references import file_states, repair_references
 from robots.urdf.cleaning.xacro_files import drop_leftovers, is_unfinished
 from robots.urdf.paths import opened_folders
@@ -276,6 +276,7 @@ _STEPS: tuple[Callable[[Element, str], Iterator[str]], ...] = (
     _repair_joints,
     repair_references,
     repair_shapes,
+    drop_zones,
     fill_ends,
     repair_inertia,
 )

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 KINDS = ("visual", "collision")
 DENSITY = 1000.0  # kg/m³; what SAPIEN takes for collision shapes
+ZONE = "safety"
 THINNEST = 1e-3  # m; of a body whose shapes are thinner
 
 Size = tuple[float, float, float]
@@ -53,6 +54,24 @@ def repair_shapes(root: Element, urdf: str) -> Iterator[str]:
                 if reason := _why_nothing(element, kind, f"{urdf}, link {name!r}", urdf):
                     link.remove(element)
                     yield f"link {name!r}: a {kind} {reason}, left out"
+
+
+def drop_zones(root: Element, _: str) -> Iterator[str]:
+    """Leave out the shapes of safety zones, which are to keep things out, and yield of which links.
+
+    Around a hand they would keep out what it is to grasp. They are links called so, for which
+    nothing is drawn.
+
+    Args:
+        root: The ``<robot>``.
+    """
+    for link in root.iterfind("link"):
+        name = link.get("name") or ""
+        shapes = link.findall("collision")
+        if shapes and ZONE in name.lower() and link.find("visual") is None:
+            for shape in shapes:
+                link.remove(shape)
+            yield f"link {name!r}: its shape left out, as it is a safety zone and not a body"
 
 
 def fill_ends(root: Element, urdf: str) -> Iterator[str]:
