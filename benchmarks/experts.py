@@ -126,7 +126,7 @@ HANDS = (
     *("xarm7_with_panda", "ur3_with_panda", "ur5_with_panda", "ur10_with_panda"),
 )
 PAIRS = tuple(dict.fromkeys(pair for hand in HANDS for pair in ((hand, hand), ("panda", hand))))
-BODIES = ("baxter", "mobile_panda_dual", "pr2", "tiago_pro")
+BODIES = ("baxter", "mobile_panda_dual", "pr2", "tiago_pro", "unitree_g1_with_hands")
 BAR = "TwoRobotLiftBar-v1"
 PAIRED = ("TwoRobotHandOver-v1", BAR, "Relay-v1")  # what pairs of robots do
 FITTING = "LiftBarThatFits-v1"  # the bar, as large as a pair holds and reaches

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -23,6 +24,7 @@ from tasks.episode import play
 WIDTH, HEIGHT = 640, 340  # of rendered pictures (pixels)
 FRAME, LAST = 60, 1500  # how long a frame stays, and the last one (ms)
 COLOURS = 64  # of a drawing
+FRONT = Camera((-0.12, -0.3, 0.62), (0.5, 0.0, 0.23), "view", WIDTH, HEIGHT, 0.82)  # of a body
 VIEW = Camera((1.2, 0.0, 1.05), (-0.05, 0.0, 0.2), "view", WIDTH, HEIGHT, 0.82)  # m, rad
 
 
@@ -32,7 +34,7 @@ def pictures(names: Sequence[str] = (), *, out: Path = DOCS / "images") -> int:
     They are committed, so that nobody needs a Vulkan driver or a planner to see them.
 
     Args:
-        names: hand_over.webp, placement_search.png, crossing.png (all).
+        names: hand_over.webp, humanoid.webp, placement_search.png, crossing.png (all).
         out: Their folder.
 
     Raises:
@@ -51,6 +53,11 @@ def hand_over(path: Path) -> None:
     film("TwoRobotPickCube-v1", 3, path)
 
 
+def humanoid(path: Path) -> None:
+    """Film a humanoid that hands a cube from one hand to the other."""
+    film("TwoRobotHandOver-v1", 0, path, FRONT, robots="unitree_g1_with_hands")
+
+
 def placement_search(path: Path) -> None:
     """Draw the layout that the page about placement search looks for."""
     targets = {"feeder": (-0.35, 0.1, 0.15), "fixture": (0.0, 0.0, 0.2), "tray": (0.35, 0.1, 0.1)}
@@ -64,19 +71,26 @@ def placement_search(path: Path) -> None:
     picture.resize((picture.width // 2, picture.height // 2)).quantize(COLOURS).save(path)
 
 
-def film(task_id: str, seed: int, path: Path) -> None:
+def film(task_id: str, seed: int, path: Path, camera: Camera = VIEW, **scenario: Any) -> None:
     """Write an animation of an expert's episode.
+
+    Args:
+        task_id: The task.
+        seed: The episode.
+        path: Of the WebP file.
+        camera: What sees it.
+        scenario: What `tasks.make` takes besides.
 
     Raises:
         UnwritableFileError: If the file cannot be written.
     """
-    task = tasks.make(task_id, render_mode="rgb_array")
+    task = tasks.make(task_id, render_mode="rgb_array", **scenario)
     plan = np.asarray(find_expert(task_id)(task, seed))
     frames: list[Image.Image] = []
     with tqdm(total=len(plan) + 1, desc=path.name, unit="frames", disable=None) as bar:
 
         def watch() -> None:
-            (view,) = task.simulation.look(0, {"view": VIEW}, ("rgb",), markers=True)
+            (view,) = task.simulation.look(0, {"view": camera}, ("rgb",), markers=True)
             frames.append(Image.fromarray(view.images["rgb"].astype(np.uint8)))
             bar.update()
 
@@ -107,6 +121,7 @@ def _beside(cell: Layout, step: int) -> dict[str, TcpGoal]:
 
 PICTURES: dict[str, Callable[[Path], None]] = {
     "hand_over.webp": hand_over,
+    "humanoid.webp": humanoid,
     "placement_search.png": placement_search,
     "crossing.png": crossing,
 }

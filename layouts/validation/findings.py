@@ -11,6 +11,7 @@ from layouts.arrangement import Arrangement
 from layouts.placement import Placement
 from layouts.validation.collisions import Approach, Postures, nearer_than
 from robot_layouts.kinematics.rotations import Floats
+from robots.parts import PINCH
 
 Point = tuple[float, ...]  # (3,) (m), world
 
@@ -193,7 +194,7 @@ def to_start_elsewhere(placement: Placement) -> str:
     robot, start = placement.robot, placement.start_keyframe
     if start is None:
         return "start from other joint positions than qpos"
-    others = [name for name in robot.keyframes if name != start]
+    others = [name for name in robot.keyframes if name not in (start, PINCH)]
     if not others:
         return f"give {robot.name} a keyframe besides {start!r}, its only one"
     return f"start from another keyframe than {start!r}: {', '.join(others)}"

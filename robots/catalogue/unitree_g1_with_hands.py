@@ -4,8 +4,8 @@ from dataclasses import replace
 
 from robots.assets.locator import UrdfLocator
 from robots.catalogue.unitree_g1 import UNITREE_G1
-from robots.descriptor import ActionSplit, GripperMaterial, JointGroup, Limb
-from robots.parts import among, both_sides, mirrored
+from robots.descriptor import ActionSplit, Fingers, GripperMaterial, JointGroup, Limb
+from robots.parts import PINCH, among, mirrored
 
 GROUPS = UNITREE_G1.action_split.groups
 LEFT_GRIPPER = JointGroup(
@@ -21,9 +21,10 @@ LEFT_GRIPPER = JointGroup(
     lower=-0.1,
     upper=0.1,
     delta=True,
-    stiffness=1e3,
-    damping=2e1,
+    stiffness=(18.4, 26.4, 2.42, 26.5, 2.42, 26.5, 2.42),
+    damping=(0.123, 0.176, 0.0162, 0.176, 0.0162, 0.176, 0.0162),
     force_limit=(2.45, 1.4, 1.4, 1.4, 1.4, 1.4, 1.4),
+    armature=(6.82e-5, 9.8e-5, 8.98e-6, 9.8e-5, 8.98e-6, 9.8e-5, 8.98e-6),
     reset_noise=False,
     limits=(
         (-1.0471976, 1.0471976),
@@ -57,7 +58,33 @@ LEFT_FINGERS = (
     "left_hand_index_0_link",
     "left_hand_index_1_link",
 )
-LEFT_TIPS = ("left_hand_thumb_2_link", "left_hand_index_1_link")
+# How thumb and index finger meet.
+LEFT_PINCH = (-0.344, 0.9732, 0.1416, -0.4422, -1.4436, -0.4422, -1.4436)
+RIGHT_PINCH = (-0.344, -0.9732, -0.1416, 0.4422, 1.4436, 0.4422, 1.4436)
+LEFT = Limb(
+    "left_hand_palm_link",
+    0.57,
+    (0.0, 0.1002, 0.2918),
+    Fingers(
+        ("left_hand_thumb_2_link", "left_hand_index_1_link"),
+        opening_signs=(-1, 1),
+        max_angle=110.0,
+        opening_axes=((0.844, -0.536, -0.034), (-0.745, 0.62, 0.246)),
+    ),
+    tcp_offset=(0.1022, -0.0645, 0.0242),
+)
+RIGHT = replace(
+    LEFT,
+    tcp_link="right_hand_palm_link",
+    base=(0.0, -0.1002, 0.2918),
+    fingers=Fingers(
+        ("right_hand_thumb_2_link", "right_hand_index_1_link"),
+        opening_signs=(-1, -1),
+        max_angle=110.0,
+        opening_axes=((0.844, 0.536, -0.034), (0.745, 0.62, -0.246)),
+    ),
+    tcp_offset=(0.1022, 0.0645, 0.0242),
+)
 LEFT_LINKS = (
     ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_thumb_0_link"),
     ("left_wrist_yaw_link", "left_hand_palm_link", "left_hand_index_0_link"),
@@ -77,15 +104,17 @@ UNITREE_G1_WITH_HANDS = replace(
         legs=GROUPS["legs"],
     ),
     tcp_link="left_hand_palm_link",
-    tcp_position_links=LEFT_TIPS,
+    tcp_offset=LEFT.tcp_offset,
+    fingers=LEFT.fingers,
     gripper_material=GripperMaterial(
         (*LEFT_FINGERS, *mirrored(LEFT_FINGERS)), 2.0, 2.0, 0.0, patch_radius=0.1
     ),
-    keyframes={"rest": (0,) * 43},
-    limbs=both_sides(
-        Limb("left_hand_palm_link", 0.529, (0.0, 0.1002, 0.2918), tcp_position_links=LEFT_TIPS)
-    ),
-    reach=0.629,  # of the left TCP, from the URDF
+    keyframes={
+        "rest": (0,) * 43,
+        PINCH: (*(0,) * 7, *LEFT_PINCH, *(0,) * 7, *RIGHT_PINCH, *(0,) * 15),
+    },
+    limbs={"left": LEFT, "right": RIGHT},
+    reach=0.668,  # of the left TCP, from the URDF
     allowed_collisions=among(  # neighbours, and what overlaps however the joints stand
         ("left_shoulder_pitch_link", "head_link", "logo_link"),
         ("right_shoulder_pitch_link", "head_link", "logo_link"),
