@@ -26,8 +26,11 @@ ALONG = 0.7  # cosine; how well a finger's y axis must lie along the way in whic
 EXACTLY = 0.95  # the same of its other axes
 STILL = 1e-3  # m; fingers whose tips part less do not open
 AGAINST = -0.2  # cosine; tips that close on each other move so much against each other, at least
-THUMB = ("thumb", "th")
-OPPOSITE = (("index", "ff"), ("middle", "mf"))  # fingers that a thumb meets, the first one first
+THUMB = ("thumb", "th", "thj")
+OPPOSITE = (
+    ("index", "ff", "ffj"),
+    ("middle", "mf", "mfj"),
+)  # fingers that a thumb meets, the first one first
 WIDE = 110.0  # degrees; of a finger that swings, as ManiSkill's SO-100 has it
 
 

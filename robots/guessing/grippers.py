@@ -9,7 +9,7 @@ the inertia of its motor are the linkage's, whichever joint the motor turns.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -357,19 +357,38 @@ def _many(
                 own += "_"
             groups[own] = _group(led, leader.span, leader.span, tips, drives)
     counts = f"{len(leaders)} numbers drive it, one for each joint that mimics none"
+    postures = _alone(leaders, followers, middle_of)
+    ends = tips.grasping()
+    if ends and tips.solid and tips.contact(ends, tips.stance.with_joints(postures[0])) is not None:
+        postures = _alone(leaders, followers, lambda joint: max(joint.span, key=abs))
+    pinch = find_pinch(tips, postures, leaders)
+    if pinch is not None:
+        led = (_led_to(followers[joint], at) for joint, at in pinch.joints.items())
+        pinch = replace(pinch, joints={joint: at for joints in led for joint, at in joints.items()})
+    return Gripper(groups, postures, (f"{name}: {counts}",), pinch)
+
+
+def _alone(
+    leaders: Sequence[ModelJoint],
+    followers: Mapping[str, Sequence[MimicJoint]],
+    opened: Callable[[ModelJoint], float],
+) -> tuple[dict[str, float], ...]:
+    """Return where the joints of a hand are on their way from open to mid-range, off their stops.
+
+    Args:
+        leaders: Those that follow no other.
+        followers: What follows each, itself first.
+        opened: Where one is when the hand is open (rad, m).
+    """
     postures: list[dict[str, float]] = []
     for part in OPENINGS:
         postures.append({})
         for joint in leaders:
             low, high = joint.span
-            value = part * middle_of(joint) + (1 - part) * (low + high) / 2
+            value = part * opened(joint) + (1 - part) * (low + high) / 2
             value = min(max(value, low + OFF * (high - low)), high - OFF * (high - low))
             postures[-1].update(_led_to(followers[joint.name], value))
-    pinch = find_pinch(tips, postures, leaders)
-    if pinch is not None:
-        led = (_led_to(followers[joint], at) for joint, at in pinch.joints.items())
-        pinch = replace(pinch, joints={joint: at for joints in led for joint, at in joints.items()})
-    return Gripper(groups, tuple(postures), (f"{name}: {counts}",), pinch)
+    return tuple(postures)
 
 
 def _led_to(followers: Sequence[MimicJoint], lead: float) -> dict[str, float]:
