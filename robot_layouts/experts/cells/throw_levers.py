@@ -34,5 +34,5 @@ def throw_levers(task: TaskEnv, seed: int) -> Plan:
         }
 
     return first_success(
-        task, seed, lambda scene: [script(end) for end in (0.12, 0.1)], as_declared=True
+        task, seed, lambda scene: [script(end) for end in (0.12, 0.1, 0.14)], as_declared=True
     )

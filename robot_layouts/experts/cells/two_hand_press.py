@@ -20,7 +20,7 @@ def two_hand_press(task: TaskEnv, seed: int) -> Plan:
     return first_success(
         task,
         seed,
-        lambda scene: [_script(task, *tried) for tried in ((16, 0.03), (22, 0.04))],
+        lambda scene: [_script(task, *tried) for tried in ((16, 0.03), (22, 0.04), (28, 0.03))],
         as_declared=True,
     )
 
