@@ -355,7 +355,7 @@ def _many(
             own = f"{name}_{re.sub('[^A-Za-z0-9]+', '_', leader.name).strip('_').lower()}"
             while own in groups:
                 own += "_"
-            groups[own] = _group(led, leader.span, leader.span, tips, drives)
+            groups[own] = _finger_group(led, leader, tips, drives)
     counts = f"{len(leaders)} numbers drive it, one for each joint that mimics none"
     postures = _alone(leaders, followers, middle_of)
     ends = tips.grasping()
@@ -366,6 +366,22 @@ def _many(
         led = (_led_to(followers[joint], at) for joint, at in pinch.joints.items())
         pinch = replace(pinch, joints={joint: at for joints in led for joint, at in joints.items()})
     return Gripper(groups, postures, (f"{name}: {counts}",), pinch)
+
+
+def _finger_group(
+    followers: Sequence[MimicJoint], leader: ModelJoint, tips: Fingertips, drives: Drives
+) -> JointGroup:
+    """Return the group of a finger whose joints follow one, as firm as fingers with a joint each.
+
+    A linkage's drives press as its motor does, which may be little beside a finger that is driven
+    by the inertia of its joints: that one would push the other open.
+    """
+    group = _group(followers, leader.span, leader.span, tips, drives)
+    firm = [drives.finger(follower.joint) for follower in followers]
+    softest = float(np.min(group.stiffness))
+    if min(drive.stiffness for drive in firm) <= softest:
+        return group
+    return replace(group, leaders=(), lead=0.0, **drive_fields(firm))
 
 
 def _alone(
