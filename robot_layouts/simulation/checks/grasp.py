@@ -208,6 +208,7 @@ CUBE = "cube"  # its name in the world
 
 _CLOSING, _HOLDING, _SHAKING = 200, 20, 40  # steps
 _CLOSE, _HOLD = 30.0, 3.0  # N with which fingers close until they feel the cube, and hold it
+_HEAVY = 0.04  # m; a cube of a longer side is held by as much more as it is heavier
 _STEP = 2e-4  # m by which they close in a step at least
 _SHAKE, _PERIOD = 0.1, 10  # rad or m to both sides, and steps; 0.5 m away that is some 8 m/s²
 _ROOM = 0.02  # of the cube's side: farther a cube moves in a step that is inside the hand
@@ -313,7 +314,8 @@ class Closing:
         """Return where the gripper's joints are to go: to close, or to hold what they grasp."""
         share = self._share()
         closing = max(_CLOSE, self._motion.force(_STEP, self._motion.share(self._side)))
-        force = firmness * _HOLD if self._grasps() else closing
+        hold = firmness * _HOLD * max(self._side / _HEAVY, 1.0) ** 3
+        force = hold if self._grasps() else closing
         return self._motion.positions(share - self._motion.pressing(force, share))
 
     def _grasps(self) -> bool:
