@@ -31,11 +31,7 @@ FIRST_ITERATIONS, ITERATIONS = 12, 30
 NEAR, NEAR_TURN = 0.1, 0.8  # m and rad from a goal after the first of them
 RANDOM_STARTS = 3
 QUICK = 2.0  # times that quick drives nearly settle in a control step
-FIRMNESSES = (
-    1.0,
-    2.5,
-    4.0,
-)  # factors on the force with which a cube is held; the first that suffices
+FIRMNESSES = (1.0, 2.5, 4.0)  # factors on the force that holds a cube; the first that suffices
 CLOSING, STEP = 60.0, 4e-4  # N with which fingers close, at least; m per step, at least
 YIELD = 6e-5  # m that quick fingers are driven into what they hold, at least
 LEAST_SIDE = 0.012  # m; of the smallest cube that they are tried with
