@@ -211,7 +211,7 @@ def _look_at(
     grippers = {limb.name: find_gripper(limb, tips[limb.name], drives) for limb in hands}
     for name, gripper in grippers.items():
         if gripper.pinch is not None:
-            tools[name] = at_pinch(tools[name], stance, gripper.pinch.place)
+            tools[name] = at_pinch(tools[name], stance, gripper.pinch)
     main = anatomy.limbs[0].name
     tools[main] = _given_tool(tools[main], overrides)
     return _Parts(model, stance, anatomy, hulls, drives, tips, tools, grippers, hints)
@@ -439,7 +439,9 @@ def _keyframes(
     found = {"rest": tuple(rest[joint] for joint in split.joints)}
     pinches = [gripper.pinch.joints for gripper in parts.grippers.values() if gripper.pinch]
     if pinches:
-        at = {**rest} | {joint: x for pinch in pinches for joint, x in pinch.items()}
+        at = dict(rest)
+        for pinch in pinches:
+            at |= pinch
         found[PINCH] = tuple(at[joint] for joint in split.joints)
     for name, joints in _postures(parts).items():
         at = {**rest, **{j: min(max(x, spans[j][0]), spans[j][1]) for j, x in joints.items()}}

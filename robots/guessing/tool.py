@@ -15,6 +15,7 @@ from robots.guessing import words
 from robots.guessing.anatomy import LimbJoints, flies
 from robots.guessing.doubt import Doubt
 from robots.guessing.fingertips import Fingertips
+from robots.guessing.pinch import Pinch
 from robots.guessing.stance import Stance
 from robots.parts import Vector3
 from robots.urdf.model import UrdfModel
@@ -85,20 +86,20 @@ def find_tool(
     return _between(stance, limb, rigid, tips, which, between)
 
 
-def at_pinch(tool: Tool, stance: Stance, place: Floats) -> Tool:
+def at_pinch(tool: Tool, stance: Stance, pinch: Pinch) -> Tool:
     """Return a tool centre point that is where fingers meet: itself, or at an offset from its link.
 
     Args:
         tool: The tool centre point.
         stance: The robot.
-        place: Where they meet, in the root's frame, as the robot stands mid-range, (3,) (m).
+        pinch: How they meet.
     """
-    off = float(np.linalg.norm(tool.on(stance.tree).places(stance.poses(stance.middle))[0] - place))
+    (there,) = tool.on(stance.tree).places(stance.poses(stance.middle))
+    off = float(np.linalg.norm(there - pinch.place))
     if off <= MEETING:
         return tool
-    which = tool.reason.partition(":")[0]
-    reason = f"{which}: {off * 100:.0f} cm from there, where two fingers meet: {tool.reason}"
-    return Tool(tool.link, (), reason, _seen_from(stance, tool.link, place))
+    reason = f"{tool.reason}; but {off * 100:.0f} cm from there, where two fingers meet"
+    return Tool(tool.link, (), reason, _seen_from(stance, tool.link, pinch.place))
 
 
 def _missed(stance: Stance, tips: Fingertips, link: str) -> tuple[float, Vector3]:
