@@ -337,7 +337,8 @@ class TestHands:
             "gripper_root2": (("root2", "end2"), True),
         }
         assert groups["gripper_root1"].followers == ((1.0, 0.0), (0.5, 0.1))
-        assert groups["gripper_root1"].leaders == ("root1",)  # each finger is a linkage
+        for finger in ("gripper_root1", "gripper_root2"):  # as firm as the one that is driven alone
+            assert groups[finger].stiffness == groups["gripper"].stiffness
 
     def test_the_hand_of_a_robot_whose_names_say_nothing_is_told_by_its_size(self, tmp_path):
         parts, last = single_arm(end="")
