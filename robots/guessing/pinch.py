@@ -51,8 +51,9 @@ def find_pinch(
     if ends is None or not tips.solid:
         return None
     joints = [joint for joint in leaders if any(tips.moved_by(joint, end) for end in ends)]
-    start = tips.stance.with_joints(postures[0])
-    found = _touching(tips, ends, start, _met(tips, ends, start, joints))
+    start, *others = map(tips.stance.with_joints, postures)
+    met = (_met(tips, ends, posture, joints) for posture in (start, *others))
+    found = next(filter(None, (_touching(tips, ends, start, posture) for posture in met)), None)
     if found is None:
         return None
     posture, place = found

@@ -13,9 +13,10 @@ from robots import LocalUrdf, RobotDescriptor, RobotLayoutsError
 from robots.bodies.hulls import load_model
 from robots.bodies.overlaps import overlapping
 from robots.from_urdf import Guess, guess_descriptor
+from robots.gripper_motion import gripper_motion
 from robots.guess import guess as guess_robot
 from robots.guessing.hints import Hints
-from robots.parts import Fingers
+from robots.parts import PINCH, Fingers
 from robots.urdf.reading import read_model
 from robots.urdf.summary import read_urdf
 from tests.robots.urdf_parts import Parts
@@ -339,6 +340,29 @@ class TestHands:
         assert groups["gripper_root1"].followers == ((1.0, 0.0), (0.5, 0.1))
         for finger in ("gripper_root1", "gripper_root2"):  # as firm as the one that is driven alone
             assert groups[finger].stiffness == groups["gripper"].stiffness
+
+    @pytest.mark.parametrize("closed_at_0", [False, True])
+    @pytest.mark.parametrize("thumb", ["thumb", "THJ"])
+    def test_a_thumb_and_a_finger_meet_in_the_keyframe_pinch(self, tmp_path, closed_at_0, thumb):
+        """Wherever the hand is open, at 0 or at the far stops; the finger beside bends alike."""
+        apart, inwards = (0.001, -1) if closed_at_0 else (0.03, 1)  # m, and the sign of a turn
+        parts, last = single_arm(end="")
+        for name, x, y in ((thumb, 0.0, 1), ("FFJ", 0.0, -1), ("MFJ", 0.015, -1)):
+            limits = (0.0, 1.2) if inwards * y > 0 else (-1.2, 0.0)
+            carrier, at = last, f"{x} {apart * y} 0.02"
+            for number in (1, 0):  # the last joint of a finger has the number 0
+                link = parts.link(f"{name}{number}_link", 0.02, "0.01 0.01 0.05", "0 0 0.025")
+                parts.joint(f"{name}{number}", carrier, link, at, axis="1 0 0", limits=limits)
+                carrier, at = link, "0 0 0.05"
+        robot = guess(parts, tmp_path).descriptor
+        pinch, rest = (
+            dict(zip(robot.joints, robot.keyframes[name], strict=True)) for name in (PINCH, "rest")
+        )
+        assert robot.fingers is not None
+        assert robot.fingers.links == (f"{thumb}0_link", "FFJ0_link")
+        assert [pinch["MFJ0"], pinch["MFJ1"]] == [pinch["FFJ0"], pinch["FFJ1"]]
+        assert abs(rest["FFJ0"]) == pytest.approx(1.14 if closed_at_0 else 0.06)  # off its stop
+        assert gripper_motion(robot).widest > 0.03  # m
 
     def test_the_hand_of_a_robot_whose_names_say_nothing_is_told_by_its_size(self, tmp_path):
         parts, last = single_arm(end="")
