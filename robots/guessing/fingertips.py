@@ -27,10 +27,8 @@ EXACTLY = 0.95  # the same of its other axes
 STILL = 1e-3  # m; fingers whose tips part less do not open
 AGAINST = -0.2  # cosine; tips that close on each other move so much against each other, at least
 THUMB = ("thumb", "th", "thj")
-OPPOSITE = (
-    ("index", "ff", "ffj"),
-    ("middle", "mf", "mfj"),
-)  # fingers that a thumb meets, the first one first
+# Fingers that a thumb meets, the first one first; a Shadow hand's joints are FFJ1, MFJ1 and so on.
+OPPOSITE = (("index", "ff", "ffj"), ("middle", "mf", "mfj"))
 WIDE = 110.0  # degrees; of a finger that swings, as ManiSkill's SO-100 has it
 
 

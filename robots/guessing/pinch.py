@@ -59,9 +59,7 @@ def find_pinch(
     posture, place = found
     at = {j.name: round(float(posture[tips.stance.index[j.name]]), 6) for j in joints}
     lead = _leading(tips, ends[1], leaders)
-    for (
-        end
-    ) in tips.ends:  # fingers that are built like the one that meets the thumb bend as it does
+    for end in tips.ends:  # fingers built like the one that meets the thumb bend as it does
         beside = _leading(tips, end, leaders)
         if end not in ends and [j.span for j in beside] == [j.span for j in lead]:
             at |= {joint.name: at[like.name] for joint, like in zip(beside, lead, strict=True)}

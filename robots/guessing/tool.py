@@ -98,7 +98,9 @@ def at_pinch(tool: Tool, stance: Stance, pinch: Pinch) -> Tool:
     off = float(np.linalg.norm(there - pinch.place))
     if off <= MEETING:
         return tool
-    reason = f"{tool.reason}; but {off * 100:.0f} cm from there, where two fingers meet"
+    which = tool.reason.partition(":")[0]
+    named = f"the middle of {' and '.join(tool.links)}" if tool.links else f"the link {tool.link}"
+    reason = f"{which}: where two fingers meet in the keyframe 'pinch', {off:.3f} m from {named}"
     return Tool(tool.link, (), reason, _seen_from(stance, tool.link, pinch.place))
 
 
