@@ -63,7 +63,7 @@ LEFT_PINCH = (-0.344, 0.9732, 0.1416, -0.4422, -1.4436, -0.4422, -1.4436)
 RIGHT_PINCH = (-0.344, -0.9732, -0.1416, 0.4422, 1.4436, 0.4422, 1.4436)
 LEFT = Limb(
     "left_hand_palm_link",
-    0.57,
+    0.568,
     (0.0, 0.1002, 0.2918),
     Fingers(
         ("left_hand_thumb_2_link", "left_hand_index_1_link"),

@@ -14,6 +14,7 @@ from layouts.frames import Pose
 from layouts.validation.collisions import nearest, stand, touching
 from robots import LayoutError, MissingPackageError, RobotRegistry, UnknownNameError
 from robots.bodies.hulls import load_model
+from robots.parts import PINCH
 from tests.catalogue import every_robot
 from tests.layouts.small_robots import FOLDING, folding, joint, link, robot, turntable, urdf
 
@@ -194,7 +195,8 @@ class TestSelfCollisions:
 
     @pytest.mark.parametrize("name", every_robot())
     def test_no_keyframe_of_ours_has_one(self, name):
-        for keyframe in RobotRegistry.load(name).keyframes:
+        """But for `pinch`, in which fingers meet."""
+        for keyframe in RobotRegistry.load(name).keyframes.keys() - {PINCH}:
             layout = Layout({"arm": Placement(name, keyframe=keyframe)})
             report = layout.validate(workspaces=False)
             assert report.ok, str(report)

@@ -129,7 +129,7 @@ def test_bases_and_reaches_of_the_catalogue_are_those_of_the_urdf(name):
         assert {limb.tcp_link, *limb.tcp_position_links} <= set(model.links)
         assert limb.fingers is None or set(limb.fingers.links) <= set(model.links)
         np.testing.assert_allclose(limb.base, find_base(model, found[side], rest), atol=1e-4)
-        tool = Tool(limb.tcp_link, limb.tcp_position_links, "")
+        tool = Tool(limb.tcp_link, limb.tcp_position_links, "", limb.tcp_offset)
         reach, _ = find_reach(model, found[side], tool, rest, limb.base)
         assert limb.reach == pytest.approx(reach, abs=1e-3)
 
