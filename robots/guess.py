@@ -444,6 +444,8 @@ def _keyframes(
             at |= pinch
         found[PINCH] = tuple(at[joint] for joint in split.joints)
     for name, joints in _postures(parts).items():
+        if name == PINCH and not pinches:  # of a gripper that closes otherwise it means nothing
+            continue
         at = {**rest, **{j: min(max(x, spans[j][0]), spans[j][1]) for j, x in joints.items()}}
         found.setdefault(name, tuple(at[joint] for joint in split.joints))
     return found
