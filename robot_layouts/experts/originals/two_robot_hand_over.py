@@ -205,8 +205,7 @@ class _Search:
         taker = self._taker
         if not len(self._ends(meetings[0].grip.pose, taker.qpos(self._scene)[None])):
             raise TaskError(f"{TAKER!r} cannot reach the goal with its gripper")
-        free = (meeting for meeting in meetings if self._is_free(now, pick, meeting))
-        found = list(islice(free, SCRIPTS))
+        found = self._free(now, pick, meetings)
         if not found:
             raise TaskError(
                 f"wherever {TAKER!r} can take the cube from {GIVER!r}, their hands overlap; stand"
@@ -355,22 +354,50 @@ class _Search:
             np.tile(goal, (len(turns), 1)), turns, frame, starts, scatter=True, loose=True
         )
 
+    def _free(
+        self, now: Floats, pick: _Picking, meetings: Sequence[_Exchange]
+    ) -> list[_Exchange]:
+        """Return the first meetings to which both hands come without touching anything.
+
+        Those come first to which the taker could also come straight from where it starts.
+        """
+        direct, other = list[_Exchange](), list[_Exchange]()
+        for meeting in meetings:
+            if not self._is_free(now, pick, meeting):
+                continue
+            ready = self._ready(meeting, meeting.take).qpos
+            if not (len(ready) and self._comes(pick, meeting, ready[0])):
+                continue
+            start = self._waiting(meeting)
+            if self._comes(pick, meeting, *_between(start, meeting.take)):
+                direct.append(meeting)
+            elif self._comes(pick, meeting, *_between(start, ready[0])):
+                other.append(meeting)
+            if len(direct) == SCRIPTS:
+                break
+        return direct or other[:SCRIPTS]
+
+    def _comes(self, pick: _Picking, meeting: _Exchange, *postures: Floats) -> bool:
+        """Return whether the taker is clear of the giver, which holds out the cube, in postures."""
+        give = self._giver.opened(meeting.give, pick.grip.held)
+        return all(self._clear(self._both(give, row)) for row in postures)
+
+    def _waiting(self, meeting: _Exchange) -> Floats:
+        """Return the posture in which the taker starts, its gripper open for the cube."""
+        return self._taker.opened(self._taker.qpos(self._scene), meeting.grip.share)
+
     def _is_free(self, now: Floats, pick: _Picking, meeting: _Exchange) -> bool:
         """Return whether no robot is inside itself, the other or the table where they meet."""
         giver, taker = self._giver, self._taker
         give, lifted = (giver.opened(row, pick.grip.held) for row in (meeting.give, now))
         released = giver.opened(meeting.give, pick.grip.share)
         taken = taker.opened(meeting.take, meeting.grip.held)
-        waiting = taker.opened(taker.qpos(self._scene), meeting.grip.share)
-        ready = self._ready(meeting, meeting.take)
+        waiting = self._waiting(meeting)
         return (
-            len(ready) > 0
-            and self._clear(self._both(give, ready.qpos[0]))
-            and self._clear(self._both(give, meeting.take))
+            self._clear(self._both(give, meeting.take))
             and self._clear(self._both(give, taken))
             and self._clear(self._both(released, taken))
             and all(self._clear(self._both(row, waiting)) for row in _between(lifted, give))
-            and all(self._clear(self._both(give, row)) for row in _between(waiting, meeting.take))
         )
 
     def _both(self, give: Floats, take: Floats) -> dict[str, Floats]:
