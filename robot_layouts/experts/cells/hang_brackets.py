@@ -22,6 +22,8 @@ from tasks.cells.hang_brackets import BASE, GRIPS, PARTS, THICK
 HIGH = 0.15  # of a part over its seat before it goes down (m)
 DOWN = (0.06, 0.045, 0.03, 0.015, 0.002)  # of a part over its seat, one after the other (m)
 EXACT = 0.003  # rad; so near an arm comes to its place over the pegs
+# How far above what it grips a hand gets ready (m), and after what the next one comes to the pegs.
+WAYS = ((0.05, "rise"), (0.1, "retreat"))
 
 
 def hang_brackets(task: TaskEnv, seed: int) -> Plan:
@@ -34,7 +36,9 @@ def hang_brackets(task: TaskEnv, seed: int) -> Plan:
     return first_success(
         task,
         seed,
-        lambda scene: [_script(task, yaw) for yaw in _turned(scene)],
+        lambda scene: [
+            _script(task, yaw, above, free) for above, free in WAYS for yaw in _turned(scene)
+        ],
         as_declared=True,
     )
 
@@ -47,17 +51,24 @@ def _turned(scene: Scene) -> list[float]:
     return [yaw, yaw + pi] if towards else [yaw + pi, yaw]
 
 
-def _script(task: TaskEnv, yaw: float) -> Script:
-    """Return the script in which the first part is turned so on the pegs (rad)."""
+def _script(task: TaskEnv, yaw: float, above: float, free: str) -> Script:
+    """Return the script in which the first part is turned so on the pegs (rad); see `WAYS`."""
+    hanging = partial(_hanging, task, above=above)
     return {
-        "first": _hanging(task, "first", 0, [yaw], []),
-        "second": _hanging(task, "second", 1, [yaw + pi], ["first.rise red"]),
-        "third": _hanging(task, "third", 2, [yaw, yaw + pi], ["second.rise blue"]),
+        "first": hanging("first", 0, [yaw], []),
+        "second": hanging("second", 1, [yaw + pi], [f"first.{free} red"]),
+        "third": hanging("third", 2, [yaw, yaw + pi], [f"second.{free} blue"]),
     }
 
 
 def _hanging(
-    task: TaskEnv, arm: str, level: int, yaws: Sequence[float], turn_of: Sequence[str]
+    task: TaskEnv,
+    arm: str,
+    level: int,
+    yaws: Sequence[float],
+    turn_of: Sequence[str],
+    *,
+    above: float,
 ) -> list[Waypoint]:
     part = PARTS[arm]
 
@@ -67,27 +78,33 @@ def _hanging(
     def at(scene: Scene, up: float) -> list[Pose]:
         return [bringing(scene, arm, part, (seat(scene, up), turn("z", yaw))) for yaw in yaws]
 
+    sides = [0.0, pi]  # about which the gripper may be turned; one of them once it has set off
+
     def grips(scene: Scene) -> list[Pose]:
         """The grip from which the arm's joints turn least on the way to the seat."""
         position, quaternion = scene.body(part)
         held, ways = position + rotate(quaternion, np.array([0.0, *GRIPS[part]])), []
-        for side, yaw in product((0.0, pi), yaws):
+        for side, yaw in product(sides, yaws):
             grip = held, gripper_facing(yaw_of(quaternion) + side, 0.0)
             by = multiply(turn("z", yaw), inverse(quaternion))
             off, turned = rotate(by, held - position), multiply(by, grip[1])
             goals = [(seat(scene, up) + off, turned) for up in (HIGH, 0.0)]
-            ways.append((_way(task, arm, scene, [backed_off(grip, 0.05), grip, *goals]), grip))
-        shortest, best = min(ways, key=lambda way: way[0])
-        return [best] if shortest < inf else []
+            way = _way(task, arm, scene, [backed_off(grip, above), grip, *goals])
+            ways.append((way, side, grip))
+        shortest, side, best = min(ways, key=lambda way: way[0])
+        if shortest == inf:
+            return []
+        sides[:] = [side]
+        return [best]
 
-    steps = carry(task, arm, part, grips, seat, height=HIGH, ready=0.03, around=0.01)
+    steps = carry(task, arm, part, grips, seat, height=HIGH, ready=0.03, around=0.01, above=above)
     over = [waypoint.name for waypoint in steps].index(f"over {part}")
     down = [
         Waypoint(f"down {part} {i}", partial(at, up=up), CLOSED, near=EXACT)
         for i, up in enumerate(DOWN)
     ]
-    above = Waypoint(f"over {part}", partial(at, up=HIGH), CLOSED, after=tuple(turn_of), near=0.02)
-    return [*steps[:over], above, *down, *steps[over + 2 :]]
+    first = Waypoint(f"over {part}", partial(at, up=HIGH), CLOSED, after=tuple(turn_of), near=0.02)
+    return [*steps[:over], first, *down, *steps[over + 2 :]]
 
 
 def _way(task: TaskEnv, arm: str, scene: Scene, poses: Sequence[Pose]) -> float:
