@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import tasks
+from benchmarks.experts import standing
 from layouts import face_to_face
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.hands import Hand
@@ -19,6 +20,12 @@ expert = find_expert(TASK)
 def test_small_and_mixed_pairs_hand_over(pair: tuple[str, str]):
     env = tasks.make(TASK, layout=face_to_face(dict(zip(("left", "right"), pair, strict=True))))
     assert any(play(env, seed, expert(env, seed)).solved for seed in range(3))
+
+
+@pytest.mark.long
+def test_a_taker_comes_round_where_it_cannot_come_straight():
+    env = standing(TASK, ("panda", "ur3_with_panda"))  # the UR3 waits across where the cube comes
+    assert play(env, 2, expert(env, 2)).solved
 
 
 def test_a_cube_out_of_reach_is_said_to_be():

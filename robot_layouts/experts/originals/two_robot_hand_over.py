@@ -173,17 +173,26 @@ class _Search:
     def picks(self) -> Iterator[_Picking]:
         """Yield ways to hold the cube as it lies, the most promising first.
 
+        Those in which the giver touches something else come last, and only for depths at which
+        there are no others.
+
         Raises:
             TaskError: If there are none.
         """
-        found = False
+        found, touching = False, list[_Picking]()
         for grip, depth in self._grips(self._giver, *self._depths):
             postures = self._picks(grip)
-            for row in self._free_picks(postures):
+            free = self._free_picks(postures)
+            rows = free or range(min(PICKS, len(postures)))
+            picks = [_Picking(postures.qpos[i], postures.turns[i], grip, depth) for i in rows]
+            if free:
                 found = True
-                yield _Picking(postures.qpos[row], postures.turns[row], grip, depth)
-        if not found:
+                yield from picks
+            else:
+                touching += picks
+        if not (found or touching):
             raise TaskError(f"{GIVER!r} cannot reach the cube with its gripper")
+        yield from touching
 
     def scripts(self, pick: _Picking, lifted: Scene) -> list[Script]:
         """Return the scripts to try, the most promising first.
@@ -269,8 +278,7 @@ class _Search:
     def _free_picks(self, picks: HandPostures) -> list[int]:
         """Return the first picks in which the giver touches nothing but the cube."""
         free = (i for i in range(len(picks)) if self._clear({self._giver.owner: picks.qpos[i]}))
-        found = list(islice(free, PICKS))
-        return found or list(range(min(PICKS, len(picks))))
+        return list(islice(free, PICKS))
 
     def _meetings(self, pick: _Picking, now: Floats, held: Floats) -> Iterator[_Exchange]:
         """Yield where the giver may give the cube, and the taker take it.
@@ -354,9 +362,7 @@ class _Search:
             np.tile(goal, (len(turns), 1)), turns, frame, starts, scatter=True, loose=True
         )
 
-    def _free(
-        self, now: Floats, pick: _Picking, meetings: Sequence[_Exchange]
-    ) -> list[_Exchange]:
+    def _free(self, now: Floats, pick: _Picking, meetings: Sequence[_Exchange]) -> list[_Exchange]:
         """Return the first meetings to which both hands come without touching anything.
 
         Those come first to which the taker could also come straight from where it starts.
