@@ -134,6 +134,21 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         with_tip(INERTIAL + SHAPE).replace("tip", "safety_box"),
         ("link 'safety_box': its shape left out, as it is a safety zone and not a body",),
     ),
+    "coarse shapes beside finer ones": (
+        with_tip(INERTIAL + SHAPE)
+        .removesuffix("</robot>")
+        .__add__(link("tip_sc", SHAPE) + joint("sc", "tip", "tip_sc", "", "fixed") + "</robot>"),
+        ("link 'tip_sc': its shape left out, as 'tip' has shapes that are finer",),
+    ),
+    "a shape that stands for fingers": (
+        with_tip(INERTIAL + SHAPE + SEEN + SHAPE.replace("<geom", '<origin xyz="0 0 0.4"/><geom'))
+        .removesuffix("</robot>")
+        .__add__(link("jaw", INERTIAL + SEEN) + joint("slide", "tip", "jaw") + "</robot>"),
+        (
+            ENDS.format("jaw"),
+            "link 'tip': 1 of its shapes left out, where nothing of it is drawn and fingers move",
+        ),
+    ),
     "a box without size": (
         with_tip(shape('<box size="0 0 0"/>')),
         ("link 'tip': a collision of a box with size='0 0 0', which has no volume, left out",),

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 KINDS = ("visual", "collision")
 DENSITY = 1000.0  # kg/m³; what SAPIEN takes for collision shapes
 ZONE = "safety"
+COARSE = "_sc"  # in Franka's files: shapes against which a planner checks an arm with itself
 THINNEST = 1e-3  # m; of a body whose shapes are thinner
 
 Size = tuple[float, float, float]
@@ -59,19 +60,26 @@ def repair_shapes(root: Element, urdf: str) -> Iterator[str]:
 def drop_zones(root: Element, _: str) -> Iterator[str]:
     """Leave out the shapes of safety zones, which are to keep things out, and yield of which links.
 
-    Around a hand they would keep out what it is to grasp. They are links called so, for which
-    nothing is drawn.
+    Around a hand they would keep out what it is to grasp. They are links for which nothing is
+    drawn and which are called so, or as another link that has shapes, with `COARSE` behind.
 
     Args:
         root: The ``<robot>``.
     """
+    solid = {link.get("name") for link in root.findall("link[collision]")}
     for link in root.iterfind("link"):
-        name = link.get("name") or ""
-        shapes = link.findall("collision")
-        if shapes and ZONE in name.lower() and link.find("visual") is None:
-            for shape in shapes:
-                link.remove(shape)
-            yield f"link {name!r}: its shape left out, as it is a safety zone and not a body"
+        name, shapes = link.get("name") or "", link.findall("collision")
+        if not shapes or link.find("visual") is not None:
+            continue
+        if ZONE in name.lower():
+            reason = "as it is a safety zone and not a body"
+        elif name.endswith(COARSE) and (own := name.removesuffix(COARSE)) in solid:
+            reason = f"as {own!r} has shapes that are finer"
+        else:
+            continue
+        for shape in shapes:
+            link.remove(shape)
+        yield f"link {name!r}: its shape left out, {reason}"
 
 
 def fill_ends(root: Element, urdf: str) -> Iterator[str]:
@@ -103,6 +111,42 @@ def fill_ends(root: Element, urdf: str) -> Iterator[str]:
             SubElement(link, "collision").extend(map(deepcopy, parts))
         if shapes:
             yield f"link {name!r} ends what collides, and has no collision: it collides as it looks"
+    for name, link in links.items():
+        if first[name] in {carriers[end] for end in found if end in carriers} - found:
+            yield from _drop_stand_ins(link, urdf)
+
+
+def _drop_stand_ins(link: Element, urdf: str) -> Iterator[str]:
+    """Leave out shapes of a link where nothing of it is drawn, and yield how many.
+
+    They stand for the fingers that it carries, wherever these are, and keep out what is grasped.
+    """
+    import numpy as np
+
+    where = f"{urdf}, link {link.get('name')!r}"
+
+    def extent(shape: Element) -> tuple[Floats, Floats] | None:
+        corners = _corners(shape, where, urdf)
+        return None if corners is None else (corners.min(axis=0), corners.max(axis=0))
+
+    drawn = [extent(visual) for visual in link.findall("visual")]
+    known = [found for found in drawn if found is not None]
+    if not known or len(known) < len(drawn):
+        return
+    lows, highs = zip(*known, strict=True)
+    apart = [
+        shape
+        for shape in link.findall("collision")
+        if (found := extent(shape)) is not None
+        and ((found[0] > np.max(highs, axis=0)) | (found[1] < np.min(lows, axis=0))).any()
+    ]
+    for shape in apart:
+        link.remove(shape)
+    if apart:
+        yield (
+            f"link {link.get('name')!r}: {len(apart)} of its shapes left out, where nothing of it"
+            " is drawn and fingers move"
+        )
 
 
 def _first_rigid(root: Element) -> dict[str, str]:
