@@ -145,8 +145,8 @@ REPAIRS: dict[str, tuple[str, tuple[str, ...]]] = {
         .removesuffix("</robot>")
         .__add__(link("jaw", INERTIAL + SEEN) + joint("slide", "tip", "jaw") + "</robot>"),
         (
+            "link 'tip': shapes that stand for its fingers, too: it collides as it looks",
             ENDS.format("jaw"),
-            "link 'tip': 1 of its shapes left out, where nothing of it is drawn and fingers move",
         ),
     ),
     "a box without size": (

@@ -86,7 +86,9 @@ def fill_ends(root: Element, urdf: str) -> Iterator[str]:
     """Have the end of an arm collide as it looks, if the arm does and its end does not.
 
     That is its last body, or the last two, as a single jaw closes on what carries it. A joint
-    without limits ends in a wheel or a flange, which is left as it is.
+    without limits ends in a wheel or a flange, which is left as it is. So does the hand that
+    carries the end, if some of its shapes stand for fingers, wherever these are: inside them
+    nothing could be grasped.
 
     Args:
         root: The ``<robot>``.
@@ -103,50 +105,41 @@ def fill_ends(root: Element, urdf: str) -> Iterator[str]:
         last = end not in carrying and moving[end].get("type") != "continuous"
         if last and end not in solid and carriers.get(bare[-1]) in solid:
             found |= {*bare}
+    hands = {link_of(joint, "parent") for end, joint in moving.items() if end in found}
     for name, link in links.items():
-        drawn = link.findall("visual") if first[name] in found else []
+        drawn = [] if first[name] not in found and name not in hands else link.findall("visual")
         shapes = [shape for shape in drawn if _is_solid(shape, f"{urdf}, link {name!r}", urdf)]
+        if not shapes:
+            continue
+        if first[name] in found:
+            yield f"link {name!r} ends what collides, and has no collision: it collides as it looks"
+        elif len(shapes) == len(drawn) and _stands_for_more(link, f"{urdf}, link {name!r}", urdf):
+            for old in link.findall("collision"):
+                link.remove(old)
+            yield f"link {name!r}: shapes that stand for its fingers, too: it collides as it looks"
+        else:
+            continue
         for shape in shapes:
             parts = (part for part in shape if part.tag in ("origin", "geometry"))
             SubElement(link, "collision").extend(map(deepcopy, parts))
-        if shapes:
-            yield f"link {name!r} ends what collides, and has no collision: it collides as it looks"
-    for name, link in links.items():
-        if first[name] in {carriers[end] for end in found if end in carriers} - found:
-            yield from _drop_stand_ins(link, urdf)
 
 
-def _drop_stand_ins(link: Element, urdf: str) -> Iterator[str]:
-    """Leave out shapes of a link where nothing of it is drawn, and yield how many.
-
-    They stand for the fingers that it carries, wherever these are, and keep out what is grasped.
-    """
+def _stands_for_more(link: Element, where: str, urdf: str) -> bool:
+    """Tell whether the middle of some shape of a link lies where nothing of it is drawn."""
     import numpy as np
 
-    where = f"{urdf}, link {link.get('name')!r}"
-
-    def extent(shape: Element) -> tuple[Floats, Floats] | None:
-        corners = _corners(shape, where, urdf)
-        return None if corners is None else (corners.min(axis=0), corners.max(axis=0))
-
-    drawn = [extent(visual) for visual in link.findall("visual")]
-    known = [found for found in drawn if found is not None]
-    if not known or len(known) < len(drawn):
-        return
-    lows, highs = zip(*known, strict=True)
-    apart = [
-        shape
-        for shape in link.findall("collision")
-        if (found := extent(shape)) is not None
-        and ((found[0] > np.max(highs, axis=0)) | (found[1] < np.min(lows, axis=0))).any()
-    ]
-    for shape in apart:
-        link.remove(shape)
-    if apart:
-        yield (
-            f"link {link.get('name')!r}: {len(apart)} of its shapes left out, where nothing of it"
-            " is drawn and fingers move"
-        )
+    drawn, solid = (
+        [
+            made
+            for shape in link.iterfind(kind)
+            if (made := _corners(shape, where, urdf)) is not None
+        ]
+        for kind in KINDS
+    )
+    points = np.concatenate(drawn)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middles = [(corners.min(axis=0) + corners.max(axis=0)) / 2 for corners in solid]
+    return any(((middle < low) | (middle > high)).any() for middle in middles)
 
 
 def _first_rigid(root: Element) -> dict[str, str]:
