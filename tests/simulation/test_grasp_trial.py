@@ -43,6 +43,12 @@ def test_a_drive_that_is_too_weak_grasps_nothing():
     )
 
 
+def test_jaws_that_close_slowly_are_waited_for():
+    slow = {"stiffness": 2250.0, "damping": 450.0, "armature": 0.1}
+    (seen,) = try_grasps(driven(RobotRegistry.load("so100"), **slow))
+    assert seen.grasps
+
+
 def test_a_robot_without_a_gripper():
     assert list(try_grasps(RobotRegistry.load("panda_stick"))) == []
 

@@ -207,6 +207,8 @@ class _Gripper:
 CUBE = "cube"  # its name in the world
 
 _CLOSING, _HOLDING, _SHAKING = 200, 20, 40  # steps
+_LONGER = 800  # more of them at most, if jaws still close, as slow ones do
+_STILL = 1e-4  # of a share, by which those that have come to rest move in a step
 _CLOSE, _HOLD = 30.0, 3.0  # N with which fingers close until they feel the cube, and hold it
 _HEAVY = 0.04  # m; a cube of a longer side is held by as much more as it is heavier
 _STEP = 2e-4  # m by which they close in a step at least
@@ -279,8 +281,14 @@ class Closing:
         self._begin(open_, place)
         alone, target = self._alone, open_.copy()
         for _ in range(_CLOSING):
-            target[self._gripper] = self._pressed(firmness)
-            alone.step(alone.numbers_for(target))
+            self._press(target, firmness)
+        for _ in range(_LONGER):
+            share = self._share()
+            if self._grasps():
+                break
+            self._press(target, firmness)
+            if abs(self._share() - share) < _STILL:
+                break
         grasped, first, share = self._grasps(), self._in_hand(), self._share()
         pose = self._in_link()
         if not shake:
@@ -305,6 +313,10 @@ class Closing:
         world = self._alone.simulation.worlds[0]
         world.stand(NAME, open_)
         world.set_pose(CUBE, *place)
+
+    def _press(self, target: Floats, firmness: float) -> None:
+        target[self._gripper] = self._pressed(firmness)
+        self._alone.step(self._alone.numbers_for(target.tolist()))
 
     def _share(self) -> float:
         now = self._alone.simulation.read().qpos(NAME)[0].astype(float)

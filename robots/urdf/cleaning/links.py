@@ -86,9 +86,9 @@ def fill_ends(root: Element, urdf: str) -> Iterator[str]:
     """Have the end of an arm collide as it looks, if the arm does and its end does not.
 
     That is its last body, or the last two, as a single jaw closes on what carries it. A joint
-    without limits ends in a wheel or a flange, which is left as it is. So does the hand that
-    carries the end, if some of its shapes stand for fingers, wherever these are: inside them
-    nothing could be grasped.
+    without limits ends in a wheel or a flange, which is left as it is. The hand that carries the
+    end collides as it looks, too, if some of its shapes stand for fingers, wherever these are:
+    inside them nothing could be grasped.
 
     Args:
         root: The ``<robot>``.
