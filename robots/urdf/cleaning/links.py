@@ -61,19 +61,22 @@ def drop_zones(root: Element, _: str) -> Iterator[str]:
     """Leave out the shapes of safety zones, which are to keep things out, and yield of which links.
 
     Around a hand they would keep out what it is to grasp. They are links for which nothing is
-    drawn and which are called so, or as another link that has shapes, with `COARSE` behind.
+    drawn and which are called so, or as the link that they are fixed to, with `COARSE` behind, if
+    that has shapes of its own.
 
     Args:
         root: The ``<robot>``.
     """
     solid = {link.get("name") for link in root.findall("link[collision]")}
+    fixed = (joint for joint in root.iterfind("joint") if joint.get("type") == "fixed")
+    carriers = {link_of(joint, "child"): link_of(joint, "parent") for joint in fixed}
     for link in root.iterfind("link"):
         name, shapes = link.get("name") or "", link.findall("collision")
         if not shapes or link.find("visual") is not None:
             continue
         if ZONE in name.lower():
             reason = "as it is a safety zone and not a body"
-        elif name.endswith(COARSE) and (own := name.removesuffix(COARSE)) in solid:
+        elif (own := carriers.get(name)) in solid and name == f"{own}{COARSE}":
             reason = f"as {own!r} has shapes that are finer"
         else:
             continue
