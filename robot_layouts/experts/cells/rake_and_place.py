@@ -13,13 +13,14 @@ from robot_layouts.experts.grasps import YAWS, bringing, need_fingers, pick
 from robot_layouts.experts.reaching import reaching
 from robot_layouts.experts.rehearsal import Plan, first_success
 from robot_layouts.experts.script import CLOSED, OPEN, Pose, Scene, Script, Waypoint
-from robot_layouts.kinematics.rotations import Floats
+from robot_layouts.kinematics.rotations import Floats, rotate
 from tasks import TaskEnv
 from tasks.cells.rake_and_place import HIGH_UP, LONG, PLACERS
 
 BEYOND, UP = 0.06, 0.07  # of the rake's head behind the farther block, and over the table (m)
 PULLED, FORTH = 0.06, 0.1  # where its head ends, and how far it goes back from the blocks (m)
 AWAY = np.array([0.0, 0.25, 0.5])  # where the puller's hand goes in the end, from its base (m)
+ACROSS = np.array([0.0, 1.0, 0.0])  # the way in which fingers part, in the gripper's frame
 IN = np.array([0.0, 0.0, 0.06])  # where a block is let go, from its box (m)
 
 
@@ -41,7 +42,7 @@ def _script(task: TaskEnv, count: int) -> Script:
             task,
             arm,
             f"block_{arm}",
-            cube_holds(f"block_{arm}"),
+            partial(_beside_the_rake, block=f"block_{arm}"),
             partial(_inside, arm=arm),
             height=0.14,
             back=0.02,
@@ -90,6 +91,13 @@ def _grips(scene: Scene) -> list[Pose]:
     along = yaw_of(quaternion)
     place = position + (0.0, 0.0, HIGH_UP)
     return [(place, gripper_facing(along + side, 0.0)) for side in (0.0, pi)]
+
+
+def _beside_the_rake(scene: Scene, block: str) -> list[Pose]:
+    """The grips of a block whose fingers part about along the rake, which lies next to it."""
+    along = rotate(scene.body("rake")[1], np.array([1.0, 0.0, 0.0]))
+    grips = cube_holds(block)(scene)
+    return [grip for grip in grips if abs(rotate(grip[1], ACROSS) @ along) > np.cos(pi / 4)]
 
 
 def _inside(scene: Scene, arm: str) -> Floats:
