@@ -28,7 +28,7 @@ VIA = 0.06  # rad: so near an arm comes to each place of a way round before it g
 SETTLING, LEADING = 0.1, 0.2  # rad from its goal at which an arm settles; share of it per step
 # Share of the force with which jaws that swing close, that they hold a cube with: with more it
 # slips out in time, with less as it is lifted.
-HOLDING = 0.5
+HOLDING = 0.1
 # Share of their range that such jaws open in a control step while they still hold a thing, which
 # springs out of them if they let go of it at once.
 LETTING_GO = 0.02

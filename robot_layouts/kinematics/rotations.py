@@ -75,12 +75,16 @@ def quaternion_of(rotation: ArrayLike) -> Floats:
 
 def rotation_of(quaternion: ArrayLike) -> Floats:
     """Return the rotation matrices of quaternions, (…, 3, 3)."""
-    w, x, y, z = _components(quaternion)
+    array = np.asarray(quaternion, float)
+    single = array.ndim == 1
+    w, x, y, z = array.tolist() if single else _components(array)  # numbers are quicker than arrays
     entries = (
         *(1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
         *(2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
         *(2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
+    if single:
+        return np.array(entries).reshape(3, 3)
     return np.stack(entries, axis=-1).reshape(*np.shape(w), 3, 3)
 
 
