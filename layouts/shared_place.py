@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache
-from math import hypot, sqrt
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,8 +105,8 @@ def working_factors(
     """Return by which factor what arms do is larger than for a task's own, and how far they stand.
 
     By how far they get near the ground, and with their grippers down if they hold things. What the
-    task's own do is in reach of the one of them that reaches least, or of that which least reaches
-    beyond the origin, unless it is said how far a place needs.
+    task's own do is in reach of the one of them that reaches least, unless it is said how far a
+    place needs.
 
     Args:
         layout: The robots.
@@ -122,25 +122,13 @@ def working_factors(
     scales, distances = list[float](), list[list[float]]()
     for held in ((), holding):
         reaches, usual = (working_reaches(each, places, held) for each in (layout, own))
-        wanted = _wanted(usual, [hypot(*own.arm(place).base_position[:2]) for place in places])
+        wanted = [min(usual)] * len(usual)
         for i, place in enumerate(places):
             if place in needed:
                 wanted[i] = needed[place] * usual[i] / own.arm(place).robot.reach
         scales.append(min(reach / want for reach, want in zip(reaches, wanted, strict=True)))
         distances.append(farther(reaches, wanted))
     return min(scales), [min(pair) for pair in zip(*distances, strict=True)]
-
-
-def _wanted(reaches: Sequence[float], away: Sequence[float]) -> list[float]:
-    """Return how far arms have to reach that do what others do (m).
-
-    Args:
-        reaches: How far those reach (m).
-        away: From the origin, how far they stand (m).
-    """
-    beyond = max(min(reach - far for reach, far in zip(reaches, away, strict=True)), 0.0)
-    least = min(reaches)
-    return [min(reach, max(least, far + beyond)) for reach, far in zip(reaches, away, strict=True)]
 
 
 def working_reaches(

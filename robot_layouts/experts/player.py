@@ -33,7 +33,7 @@ HOLDING = 0.1
 # springs out of them if they let go of it at once.
 LETTING_GO = 0.02
 FIRM = 10  # control steps that they close on after they feel a thing: drives press harder by and by
-OPENING = 0.08  # m; between the fingers of a Panda, for which scripts are written, when it is open
+SHUT = -0.6  # action number at which a Panda's fingers meet; beyond it they press
 # What is pushed slides on by v² / 2µg (m): 2µg of bodies on a table (m/s²), and the share of its
 # way that a push may lack, unless it stands for so many control steps.
 SLOWS, LACKING, STANDS = 2 * 0.3 * 9.81, 0.3, 3
@@ -78,8 +78,8 @@ class _Fingers:
 
     def move(self, number: float, scene: Scene) -> tuple[float | None, float | None]:
         """See `_Jaws.move`; nothing closes them but the number itself."""
-        wide = self._opening * (number - CLOSED) / (OPEN - CLOSED)
-        return (self._motion.share(wide) if number > CLOSED else None), None
+        wide = self._opening * (number - SHUT) / (OPEN - SHUT)
+        return (self._motion.share(wide) if number > SHUT else None), None
 
 
 class Player:
@@ -341,9 +341,12 @@ class Player:
 
 def _smaller(task: TaskEnv, robot: str) -> _Fingers | None:
     """Return the fingers of a robot if they open farther than a task asks for that is smaller."""
-    opening = OPENING * task.task.fit.scale
-    if opening < OPENING:
-        with suppress(DescriptorError):  # a robot without fingers, or whose fingers nothing drives
-            motion = gripper_motion(task.layout.arm(robot).robot)
+    fit, declared = task.task.fit, type(task.task).layout
+    if fit.scale < 1.0 and robot in declared.arms:
+        with suppress(DescriptorError):  # robots without fingers, or whose fingers nothing drives
+            motion, own = (
+                gripper_motion(layout.arm(robot).robot) for layout in (task.layout, declared)
+            )
+            opening = fit.length(own.widest)
             return _Fingers(motion, opening) if motion.widest > opening else None
     return None

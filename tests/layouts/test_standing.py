@@ -11,7 +11,7 @@ import pytest
 from layouts import Layout, Placement, around_table, at_task, face_to_face, ring, single
 from layouts.frames import Frame
 from layouts.ready import drawn_back
-from layouts.shared_place import SHARES_DOWN, SHARES_LOW, working_factors, working_reaches
+from layouts.shared_place import SHARES_DOWN, SHARES_LOW, working_reaches
 from robots import AssetError, LayoutError, RobotRegistry, UnknownNameError
 from robots.assets.locator import UrdfLocator
 
@@ -49,22 +49,6 @@ def test_what_the_roles_do_is_in_reach_of_the_one_that_reaches_least():
     distances = {name: abs(complex(*p.base_position[:2])) for name, p in placed.items()}
     assert distances["far"] == pytest.approx(distances["near"])
     assert distances["near"] == pytest.approx(0.8 * 0.9 * 0.48 / 0.855, abs=1e-3)
-
-
-def test_a_place_that_is_farther_off_needs_a_longer_arm():
-    """Both stand as much beyond the origin's reach as the one that reaches least beyond it."""
-    two = Layout(
-        {
-            "far": Placement("panda", (0.8, 0.0, 0.0), rpy=(0.0, 0.0, np.pi)),
-            "near": Placement("xarm7", (-0.6, 0.0, 0.0)),
-        }
-    )
-    scale, _ = working_factors(at_task({"far": "ur5"}, two), two, [*two], (), {})
-    assert scale == 1.0
-    scale, _ = working_factors(at_task({"far": "xarm7"}, two), two, [*two], (), {})
-    assert scale == pytest.approx(0.77 / 0.855)
-    scale, _ = working_factors(at_task({"near": "ur5"}, two), two, [*two], (), {})
-    assert scale == 1.0
 
 
 def test_a_shorter_arm_stands_nearer_where_its_place_needs_a_longer_one():
