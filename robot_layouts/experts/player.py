@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from math import pi, remainder, sqrt
 
 import numpy as np
@@ -18,8 +17,6 @@ from robot_layouts.experts.ways import NoWayError, Ways
 from robot_layouts.kinematics.rotations import Floats, inverse, rotate
 from robot_layouts.kinematics.solve import by_way
 from robot_layouts.simulation.checks.overlaps import RobotsAlone
-from robots import DescriptorError
-from robots.gripper_motion import GripperMotion, gripper_motion
 from tasks import TaskEnv
 
 PATIENCE = 40  # control steps without progress after which an arm counts as blocked
@@ -33,7 +30,6 @@ HOLDING = 0.1
 # springs out of them if they let go of it at once.
 LETTING_GO = 0.02
 FIRM = 10  # control steps that they close on after they feel a thing: drives press harder by and by
-SHUT = -0.6  # action number at which a Panda's fingers meet; beyond it they press
 # What is pushed slides on by v² / 2µg (m): 2µg of bodies on a table (m/s²), and the share of its
 # way that a push may lack, unless it stands for so many control steps.
 SLOWS, LACKING, STANDS = 2 * 0.3 * 9.81, 0.3, 3
@@ -70,18 +66,6 @@ class _Jaws:
         return None, HOLDING * self._closing if held else self._closing
 
 
-class _Fingers:
-    """What fingers do that open farther than a task needs which is made smaller: they open less."""
-
-    def __init__(self, motion: GripperMotion, opening: float) -> None:
-        self._motion, self._opening = motion, opening
-
-    def move(self, number: float, scene: Scene) -> tuple[float | None, float | None]:
-        """See `_Jaws.move`; nothing closes them but the number itself."""
-        wide = self._opening * (number - SHUT) / (OPEN - SHUT)
-        return (self._motion.share(wide) if number > SHUT else None), None
-
-
 class Player:
     """Takes one robot through its waypoints."""
 
@@ -114,7 +98,6 @@ class Player:
             self._reach = task.simulation.backend.point_reach(robot)
             self._base = scene.base(robot)
         self._jaws = _Jaws(task, robot, grip) if (grip := role_grip(task, robot)) else None
-        self._fingers = self._jaws or _smaller(task, robot)
         self._goal = self._start = self._driver.arm(scene.qpos(robot))
         self._gripper: float = OPEN
         self._share: float | None = None
@@ -178,8 +161,8 @@ class Player:
         share, squeeze = self._share, self._squeeze
         if callable(squeeze):
             squeeze = squeeze(scene)
-        if self._fingers is not None and share is None and squeeze is None:
-            share, squeeze = self._fingers.move(self._gripper, scene)
+        if self._jaws is not None and share is None and squeeze is None:
+            share, squeeze = self._jaws.move(self._gripper, scene)
         return self._driver.action(goal, self._gripper, qpos, share, squeeze, self._pace)
 
     def _lead(self, goal: Floats, scene: Scene) -> Floats | float:
@@ -337,16 +320,3 @@ class Player:
         starts = [arm + about * side * (np.arange(len(arm)) == 0) for side in (0, 1, -1)]
         goals = [self._reach.solve(point, place, start) for start in starts]
         return [goal for goal in goals if goal is not None]
-
-
-def _smaller(task: TaskEnv, robot: str) -> _Fingers | None:
-    """Return the fingers of a robot if they open farther than a task asks for that is smaller."""
-    fit, declared = task.task.fit, type(task.task).layout
-    if fit.scale < 1.0 and robot in declared.arms:
-        with suppress(DescriptorError):  # robots without fingers, or whose fingers nothing drives
-            motion, own = (
-                gripper_motion(layout.arm(robot).robot) for layout in (task.layout, declared)
-            )
-            opening = fit.length(own.widest)
-            return _Fingers(motion, opening) if motion.widest > opening else None
-    return None

@@ -10,10 +10,8 @@ from robot_layouts.experts import find_expert
 from robot_layouts.experts.framed import FramedScene
 from robot_layouts.experts.grips import role_grip
 from robot_layouts.experts.hands import Hand
-from robot_layouts.experts.player import Player
-from robot_layouts.experts.script import CLOSED, OPEN, Scene, Waypoint
+from robot_layouts.experts.script import Scene
 from robot_layouts.experts.tips import pose_solver
-from robot_layouts.simulation.checks.overlaps import RobotsAlone
 from tasks.episode import play
 
 PLACES = ("first", "second", "third")
@@ -47,20 +45,6 @@ def test_other_grippers_and_roles_that_hold_nothing_have_no_such_grip(small):
     assert role_grip(own, "first") is None
     drawers = tasks.make("CellCloseDrawers-v1", robots={"first": "so101"}, obs_mode="none")
     assert role_grip(drawers, "first") is None
-
-
-def test_fingers_open_less_for_what_is_made_smaller():
-    env = tasks.make(SORT, robots={"first": "so101"}, obs_mode="none")
-    env.reset(seed=0)
-    scene, alone = Scene(env), RobotsAlone(env.task.layout)
-    (low, high), *_ = env.task.layout["second"].robot.action_split.groups["gripper"].ranges
-    for number, opening in ((OPEN, 0.08), (CLOSED, 2 * low)):
-        player = Player(env, "second", [Waypoint("go on", None, number)], scene, alone)
-        sent = player.act(scene, set())[-1]
-        target = low + (sent + 1) / 2 * (high - low)
-        scale = env.task.fit.scale if number == OPEN else 1.0
-        assert 2 * target == pytest.approx(scale * opening, abs=1e-3)
-    assert env.task.fit.scale < 0.5
 
 
 def test_scripts_bring_the_middle_of_what_is_held_to_places(small):
