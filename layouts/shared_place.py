@@ -34,13 +34,8 @@ _MANY = 20  # postures with the gripper down that show how far it gets so
 # reach; the cosine from straight down; which share of them reaches less far; how that is rounded.
 # What is raised has to be in reach as well, so that the farthest posture at each height counts.
 _LEVELS, _UPRIGHT, _FAR, _ROUNDED = ((0.0, 0.08), (0.08, 0.16), (0.16, 0.25)), 0.94, 0.9, 0.05
-# Of postures in which a tip can push what stands there: the cosine, and the share of the nearest.
-_STEEP, _NEARLY_ALL = 0.6, 0.995
-# What `_share_low` finds of the robots that tasks are declared for, whose files need not be there.
+# What `_share_down` finds of the robots that tasks are declared for, whose files need not be there.
 SHARES_DOWN = {"panda": 0.9, "panda_wristcam": 0.9, "franka_panda": 0.9}
-SHARES_LOW: Mapping[str, float] = dict.fromkeys(
-    ("panda", "panda_wristcam", "franka_panda", "panda_stick", "xarm7", "ur10", "fetch"), 1.0
-)
 
 
 def shared_place(
@@ -104,9 +99,9 @@ def working_factors(
 ) -> tuple[float, list[float]]:
     """Return by which factor what arms do is larger than for a task's own, and how far they stand.
 
-    By how far they get near the ground, and with their grippers down if they hold things. What the
-    task's own do is in reach of the one of them that reaches least, unless it is said how far a
-    place needs.
+    By their reach, and no more than by how far they get with their grippers down if they hold
+    things. What the task's own do is in reach of the one of them that reaches least, unless it is
+    said how far a place needs.
 
     Args:
         layout: The robots.
@@ -136,10 +131,9 @@ def working_reaches(
 ) -> list[float]:
     """Return how far arms of a layout reach where they work (m).
 
-    That is near the ground they stand on, with their grippers about straight down if they hold
-    things, and else pointing down more than aside: random postures say how far from their bases. It
-    is the reach of their descriptors for those on wheels, that hardly get there, and for those
-    whose files are not at hand.
+    Those that hold things do with their grippers about straight down, near the ground they stand
+    on: random postures say how far from their bases. It is the reach of their descriptors for all
+    others, and for those on wheels, that hardly get there, or whose files are not at hand.
 
     Args:
         layout: The robots.
@@ -147,17 +141,16 @@ def working_reaches(
         holding: The places whose robots hold things.
     """
     return [
-        layout.arm(place).robot.reach * _share_low(layout, place, place in holding)
+        layout.arm(place).robot.reach * (_share_down(layout, place) if place in holding else 1.0)
         for place in places
     ]
 
 
-def _share_low(layout: Arrangement, place: str, holding: bool) -> float:
-    """Return at which share of its reach an arm still works near the ground, at most 1."""
+def _share_down(layout: Arrangement, place: str) -> float:
+    """Return at which share of its reach an arm still gets to the ground with its gripper down."""
     arm, owner = layout.arm(place), layout[layout.owner(place)]
-    known = SHARES_DOWN if holding else SHARES_LOW
-    if arm.robot.name in known and in_catalogue(arm.robot):
-        return known[arm.robot.name]
+    if arm.robot.name in SHARES_DOWN and in_catalogue(arm.robot):
+        return SHARES_DOWN[arm.robot.name]
     base = pose_matrix(owner.base_pose.position, owner.base_pose.quaternion)
     body = body_joints(owner, arm.robot)
     try:
@@ -165,27 +158,14 @@ def _share_low(layout: Arrangement, place: str, holding: bool) -> float:
     except AssetError:
         return 1.0
     points = (transform(base, points) - arm.base_position) / arm.robot.reach
-    down = -(approaches @ base[:3, :3].T)[:, 2]
-    steps = _to_hold(points[down > _UPRIGHT]) if holding else _to_push(points[down > _STEEP])
-    return 1.0 if steps is None else min(round(steps * _ROUNDED, 2), 1.0)
-
-
-def _to_push(points: Floats) -> int | None:
-    """Return how far places are, (n, 3) of the reach, in `_ROUNDED`; None if few are low."""
-    low = points[(0 < points[:, 2]) & (points[:, 2] < HEIGHT)]
-    if len(low) < _MANY:
-        return None
-    return round(float(np.quantile(np.hypot(*low[:, :2].T), _NEARLY_ALL)) / _ROUNDED)
-
-
-def _to_hold(points: Floats) -> int | None:
-    """Return the same of places from which things are raised."""
-    levels = [points[(low < points[:, 2]) & (points[:, 2] <= high)] for low, high in _LEVELS]
+    upright = points[(approaches @ base[:3, :3].T)[:, 2] < -_UPRIGHT]
+    levels = [upright[(low < upright[:, 2]) & (upright[:, 2] <= high)] for low, high in _LEVELS]
     if sum(map(len, levels)) < _MANY:
-        return None
+        return 1.0
     far = float(np.quantile(np.hypot(*np.concatenate(levels)[:, :2].T), _FAR))
     ends = [float(np.hypot(*at[:, :2].T).max()) for at in levels if len(at) >= _MANY]
-    return min([round(far / _ROUNDED), *(int(end / _ROUNDED) for end in ends)])
+    steps = [round(far / _ROUNDED), *(int(end / _ROUNDED) for end in ends)]
+    return round(min(steps) * _ROUNDED, 2)
 
 
 def _near_ground(layout: Arrangement, place: str, height: float, table: Rectangle | None) -> Floats:

@@ -11,7 +11,7 @@ import pytest
 from layouts import Layout, Placement, around_table, at_task, face_to_face, ring, single
 from layouts.frames import Frame
 from layouts.ready import drawn_back
-from layouts.shared_place import SHARES_DOWN, SHARES_LOW, working_reaches
+from layouts.shared_place import SHARES_DOWN, working_reaches
 from robots import AssetError, LayoutError, RobotRegistry, UnknownNameError
 from robots.assets.locator import UrdfLocator
 
@@ -48,7 +48,7 @@ def test_what_the_roles_do_is_in_reach_of_the_one_that_reaches_least():
     placed = at_task(dict.fromkeys(two, "so101"), two)
     distances = {name: abs(complex(*p.base_position[:2])) for name, p in placed.items()}
     assert distances["far"] == pytest.approx(distances["near"])
-    assert distances["near"] == pytest.approx(0.8 * 0.9 * 0.48 / 0.855, abs=1e-3)
+    assert distances["near"] == pytest.approx(0.8 * 0.48 / 0.855, abs=1e-3)
 
 
 def test_a_shorter_arm_stands_nearer_where_its_place_needs_a_longer_one():
@@ -110,16 +110,13 @@ def test_an_arm_on_a_torso_draws_its_hand_back():
     assert not [f for f in report.findings if f.serious and f.kind == "collision"]
 
 
-@pytest.mark.parametrize(
-    ("name", "known", "holding"),
-    [("SHARES_DOWN", SHARES_DOWN, ["arm"]), ("SHARES_LOW", SHARES_LOW, [])],
-)
-def test_how_far_robots_of_tasks_reach_is_as_their_files_say(name, known, holding, monkeypatch):
-    monkeypatch.setattr(f"layouts.shared_place.{name}", {})
-    for robot in known.keys() - {"fetch"}:  # its hand is hardly ever so low
+def test_how_far_robots_of_tasks_reach_down_is_as_their_files_say(monkeypatch):
+    known = dict(SHARES_DOWN)
+    monkeypatch.setattr("layouts.shared_place.SHARES_DOWN", {})
+    for robot, share in known.items():
         layout = single({"arm": robot})
-        reach = known[robot] * layout["arm"].robot.reach
-        assert working_reaches(layout, ["arm"], holding) == [reach]
+        assert working_reaches(layout, ["arm"], ["arm"]) == [share * layout["arm"].robot.reach]
+        assert working_reaches(layout, ["arm"], []) == [layout["arm"].robot.reach]
 
 
 def test_the_arms_of_one_body_serve_the_roles_called_like_them(ready):
@@ -168,7 +165,7 @@ def test_wheels_stand_on_an_edge_of_a_table_as_well():
 def test_small_arms_on_edges_of_a_table_stand_nearer_to_its_middle():
     """Also where they all stand on one side of it."""
     edges = around_table({"a": "panda", "b": "panda"}, edges=("west", "west"), table=(1.8, 1.7))
-    share = 0.9 * RobotRegistry.load("so101").reach / RobotRegistry.load("panda").reach
+    share = RobotRegistry.load("so101").reach / RobotRegistry.load("panda").reach
     for name, placement in at_task("so101", edges).items():
         assert placement.on == edges[name].on
         own = np.array(edges[name].base_position)
