@@ -32,7 +32,7 @@ _OFTEN = 3  # samples in a cell and its neighbours that show it to be well withi
 _MANY = 20  # postures with the gripper down that show how far it gets so
 # Of postures in which a gripper can take what lies on the ground: the heights, as shares of the
 # reach; the cosine from straight down; which share of them reaches less far; how that is rounded.
-# What is raised has to be in reach as well, so that the farthest posture at each height counts.
+# What is raised has to be in reach as well: no farther than the farthest posture at each height.
 _LEVELS, _UPRIGHT, _FAR, _ROUNDED = ((0.0, 0.08), (0.08, 0.16), (0.16, 0.25)), 0.94, 0.9, 0.05
 # What `_share_down` finds of the robots that tasks are declared for, whose files need not be there.
 SHARES_DOWN = {"panda": 0.9, "panda_wristcam": 0.9, "franka_panda": 0.9}
