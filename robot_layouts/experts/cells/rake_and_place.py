@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from math import pi
 
 import numpy as np
 
-from robot_layouts.experts.cells.moves import carry, cube_holds
+from robot_layouts.experts.cells.moves import Grips, carry, cube_holds
 from robot_layouts.experts.geometry import backed_off, gripper_facing, turn, yaw_of
 from robot_layouts.experts.grasps import YAWS, bringing, need_fingers, pick
 from robot_layouts.experts.reaching import reaching
@@ -32,17 +33,24 @@ def rake_and_place(task: TaskEnv, seed: int) -> Plan:
     """
     need_fingers(task, "raking and putting away", *task.layout.arms)
     return first_success(
-        task, seed, lambda scene: [_script(task, count) for count in (8, 14)], as_declared=True
+        task,
+        seed,
+        lambda scene: [
+            _script(task, count, holds)
+            for holds in (cube_holds, _beside_the_rake)
+            for count in (8, 14)
+        ],
+        as_declared=True,
     )
 
 
-def _script(task: TaskEnv, count: int) -> Script:
+def _script(task: TaskEnv, count: int, holds: Callable[[str], Grips]) -> Script:
     placing = {
         arm: carry(
             task,
             arm,
             f"block_{arm}",
-            partial(_beside_the_rake, block=f"block_{arm}"),
+            holds(f"block_{arm}"),
             partial(_inside, arm=arm),
             height=0.14,
             back=0.02,
@@ -93,11 +101,15 @@ def _grips(scene: Scene) -> list[Pose]:
     return [(place, gripper_facing(along + side, 0.0)) for side in (0.0, pi)]
 
 
-def _beside_the_rake(scene: Scene, block: str) -> list[Pose]:
-    """The grips of a block whose fingers part about along the rake, which lies next to it."""
-    along = rotate(scene.body("rake")[1], np.array([1.0, 0.0, 0.0]))
-    grips = cube_holds(block)(scene)
-    return [grip for grip in grips if abs(rotate(grip[1], ACROSS) @ along) > np.cos(pi / 4)]
+def _beside_the_rake(block: str) -> Grips:
+    """Return the grips of a block whose fingers part about along the rake next to it."""
+
+    def grips(scene: Scene) -> list[Pose]:
+        along = rotate(scene.body("rake")[1], np.array([1.0, 0.0, 0.0]))
+        some = cube_holds(block)(scene)
+        return [grip for grip in some if abs(rotate(grip[1], ACROSS) @ along) > np.cos(pi / 4)]
+
+    return grips
 
 
 def _inside(scene: Scene, arm: str) -> Floats:
