@@ -22,14 +22,14 @@ from tasks.maths import Array, Floats
 
 PARTS = {"south": "can", "east": "block", "north": "ball", "west": "cube"}
 LOW, HIGH = (-0.145, -0.095, 0.0), (0.145, 0.095, 0.1)  # of what is in the tote, in its frame (m)
-TURN = 0.3  # of the tote (rad)
+TURN = 0.25  # of the tote (rad)
 
 
 @register_task("CellPackTote-v1")
 class CellPackTote(CellTask):
     """Pack all four things into the tote, each arm the one before it.
 
-    The tote stands in the middle, up to 2 cm off along x and y and turned by up to 17°; the things
+    The tote stands in the middle, up to 2 cm off along x and y and turned by up to 14°; the things
     lie 33 to 38 cm from the middle before their arms, up to 6 cm aside, turned at random.
 
     Success: all four are in the tote, let go.
