@@ -1,8 +1,8 @@
 """``python -m benchmarks cells``: what the experts of cells solve with other robots than their own.
 
 All roles that admit a robot are filled with it; those that need fingers keep their own robot where
-it has none. Cells are also played by two makes in turn, drawn by the cell's name, and some by
-mixtures that were chosen.
+it has none. Cells are also played by two makes in turn, drawn by the cell's name, some by mixtures
+that were chosen, and some by their own robots in places that a search found.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from contextlib import closing
 from itertools import cycle, permutations, product
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import torch
 from tqdm import tqdm
@@ -28,6 +29,7 @@ from benchmarks.records import (
     write_record,
 )
 from benchmarks.skills import robot_of
+from robot_layouts.data.elsewhere import stand_elsewhere
 from robot_layouts.experts import find_expert
 from robots import RobotLayoutsError
 from tasks import Needs, get_task_class, list_tasks, make
@@ -56,6 +58,7 @@ def cells(
     tasks: tuple[str, ...] | None = None,
     seeds: int = 3,
     pairs: int = 0,
+    elsewhere: int = 0,
     out: Path = DOCS / "cells_robots.json",
 ) -> int:
     """Let experts of cells play with other robots in all roles that admit them, and with mixtures.
@@ -66,19 +69,20 @@ def cells(
         tasks: Which cells; all of those that fit their robots if not given.
         seeds: How many episodes of each; those in the record are not played again.
         pairs: Of how many pairs of makes each cell is also played, which take its roles in turn.
+        elsewhere: In how many layouts of a search each cell is also played by its own robots.
         out: The record, written after every episode; the page is beside it.
 
     Raises:
         RobotLayoutsError: If something cannot be read or written.
     """
     torch.set_num_threads(1)
-    record = read_record(out, versions={}, cells={}, pairs={}, mixed={})
+    record = read_record(out, versions={}, cells={}, pairs={}, mixed={}, elsewhere={})
     chosen = _of_the_library() if tasks is None else tasks
-    for task, label, named, kept in tqdm([*_cases(chosen, robots, pairs)], disable=None):
+    for task, label, named, kept in tqdm([*_cases(chosen, robots, pairs, elsewhere)], disable=None):
         seen = (
             record[kept].setdefault(task, {}).setdefault(label, {"robots": named, "episodes": {}})
         )
-        for _ in _played(task, seen, seeds):
+        for _ in _played(task, label, seen, seeds):
             record["versions"] |= versions_of("sapien", "ompl", "python-fcl")
             write_record(out, record)
     shown = [*dict.fromkeys(robot for of in record["cells"].values() for robot in of)]
@@ -90,7 +94,7 @@ def cells(
     ]
     failures = [
         line
-        for kept in ("cells", "pairs", "mixed")
+        for kept in ("cells", "pairs", "mixed", "elsewhere")
         for task, of in sorted(record[kept].items())
         for line in _failures(task, of)
     ]
@@ -101,6 +105,9 @@ def cells(
         solved=table(("cell", *shown), [*rows, _total(record["cells"], shown)]),
         pairs=_matrix(record["pairs"]),
         mixed=mixed,
+        elsewhere=[
+            (task, *map(_of, of.values())) for task, of in sorted(record["elsewhere"].items())
+        ],
         failures=failures,
     )
     return 0
@@ -117,7 +124,7 @@ def _of_the_library() -> list[str]:
 
 
 def _cases(
-    tasks: Sequence[str], robots: Sequence[str], pairs: int
+    tasks: Sequence[str], robots: Sequence[str], pairs: int, elsewhere: int
 ) -> Iterator[tuple[str, str, dict[str, str], str]]:
     """Yield what is played: the task, what its robots are called together, which, and the table."""
     for robot, task in product(robots, tasks):
@@ -138,6 +145,8 @@ def _cases(
                 dict(zip(get_task_class(task).layout, named, strict=True)),
                 "mixed",
             )
+    for task, seed in product(tasks, range(elsewhere)):
+        yield task, f"places {seed}", {}, "elsewhere"
 
 
 def _roles(task: str, robot: str) -> list[str]:
@@ -147,14 +156,20 @@ def _roles(task: str, robot: str) -> list[str]:
     return [role for role in cls.layout if fingers or not cls.needs.get(role, anyone).fingers]
 
 
-def _played(task: str, seen: Record, seeds: int) -> Iterator[None]:
+def _making(task: str, label: str, robots: Mapping[str, str]) -> dict[str, Any]:
+    """Return the robots of a case, or where its own stand."""
+    if robots:
+        return {"robots": {role: robot_of(name) for role, name in robots.items()}}
+    return {"layout": stand_elsewhere(task, seed=int(label.split()[1]))}
+
+
+def _played(task: str, label: str, seen: Record, seeds: int) -> Iterator[None]:
     """Play the seeds that are missing, and yield after each of them."""
     missing = [str(seed) for seed in range(seeds) if str(seed) not in seen["episodes"]]
     if not missing:
         return
     try:
-        named = {role: robot_of(name) for role, name in seen["robots"].items()}
-        env = make(task, robots=named, obs_mode="none")
+        env = make(task, obs_mode="none", **_making(task, label, seen["robots"]))
     except RobotLayoutsError as error:
         seen["episodes"] |= dict.fromkeys(missing, _first_line(error))
         yield

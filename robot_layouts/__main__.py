@@ -39,6 +39,7 @@ _FOR_USERS = {
     "tasks preview": "tasks.commands:preview",
     "tasks export": "tasks.commands:export",
     "tasks check": "robot_layouts.data.gate:check",
+    "tasks elsewhere": "robot_layouts.data.elsewhere:elsewhere",
     "layouts show": "layouts.commands:show",
     "layouts validate": "layouts.commands:validate",
     "layouts search": "layouts.commands:search",

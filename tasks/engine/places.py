@@ -41,7 +41,8 @@ def built_layout(task_class: type[Task], scenario: Scenario) -> Layout:
 def fitted(task_class: type[Task], layout: Layout) -> dict[str, Any]:
     """Return what differs in a task that fits other robots than its own, by attribute.
 
-    Its fit, and from where it is seen; nothing for its own robots.
+    Its fit, from where it is seen, and a table also where it is declared to work; nothing for its
+    own robots.
 
     Raises:
         TaskError: If no place is in reach of both arms.
@@ -49,11 +50,14 @@ def fitted(task_class: type[Task], layout: Layout) -> dict[str, Any]:
     own = task_class.layout
     held, needed = (of(task_class, own.places) for of in (held_widths, needed_reaches))
     fit = fit_to(layout, own, held, needed, task_class.table.outline(layout))
+    bases = [fit.place(own.arm(place).base_position)[:2] for place in own.places]
+    table = task_class.table.under(layout, bases)
+    bodies = {"table": table, "bodies": {**task_class.bodies, "table": table}}
     if fit.as_declared:
-        return {}
+        return bodies if table != task_class.table else {}
     eye, target = map(fit.place, task_class.viewpoint)
     cameras = tuple(_fitted(camera, fit) for camera in task_class.cameras)
-    return {"fit": fit, "viewpoint": (eye, target), "cameras": cameras}
+    return {"fit": fit, "viewpoint": (eye, target), "cameras": cameras, **bodies}
 
 
 def _fitted(camera: Camera, fit: Fit) -> Camera:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import cos, isfinite, sin
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypedDict
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypedDict
 
 from layouts import Layout
 from objects import ObjectDescriptor, ObjectRegistry
@@ -479,6 +479,10 @@ class Surroundings(ABC):
         """
         return None
 
+    def under(self, layout: Layout, places: Sequence[tuple[float, float]]) -> Self:
+        """Return what robots stand in that also lies under places, x and y (m); mostly the same."""
+        return self
+
     @abstractmethod
     def add_to(self, world: World, name: str) -> None:
         """Build it; every reset finds it where it is."""
@@ -513,15 +517,27 @@ class Table(Surroundings):
 
 @dataclass(frozen=True)
 class WideTable(Surroundings):
-    """A table under all robots of a layout, its top at z = 0, and the floor below it."""
+    """A table under all robots of a layout, its top at z = 0, and the floor below it.
+
+    Attributes:
+        others: Places that it lies under like under robots, x and y (m).
+    """
+
+    others: tuple[tuple[float, float], ...] = ()
 
     def outline(self, layout: Layout) -> Rectangle:
         """Return the outline of its top: x_min, y_min, x_max, y_max (m)."""
-        return wide_table_outline(layout)
+        return wide_table_outline(layout, self.others)
+
+    def under(self, layout: Layout, places: Sequence[tuple[float, float]]) -> Self:
+        """Return the table that also lies under places, x and y (m)."""
+        x_min, y_min, x_max, y_max = self.outline(layout)
+        on_it = all(x_min <= x <= x_max and y_min <= y <= y_max for x, y in places)
+        return self if on_it else replace(self, others=(*places,))
 
     def add_to(self, world: World, name: str) -> None:
         """Build it; its body is called ``table``."""
-        add_wide_table(world)
+        add_wide_table(world, self.others)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ lies between them, how it is turned, and by which factor it is larger.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
+from math import inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ _HELD = 0.75  # of a gripper's opening that a body to be held may take
 _PINCHED = 0.4  # the same between finger tips that meet, which are round and may turn
 _SPLAYED = 0.28  # rad; between jaws that are turned more a body is held by its edges, and slips out
 _LARGEST, _SMALLEST = 3.0, 0.05
+_ASTRAY = 0.02  # m by which arms have to stand better about the origin as it is for it to stay
 _DIGITS = 3  # of places and turns: bases are rounded, too
 
 
@@ -65,10 +66,14 @@ def fit_to(
     scale, factors = working_factors(layout, declared, declared.places, held, needed)
     if held:
         widest = max(held.values())
-        scale = min([scale, *(_holds(arm.robot) / widest for arm in arms if _opening(arm.robot))])
+        others = [arm.robot for arm, its in zip(arms, own, strict=True) if not _able(arm, its)]
+        scale = min([scale, *(_holds(robot) / widest for robot in others if _opening(robot))])
     turn = _turn(own, arms)
     (x, y), room = _origin(own, arms, factors, turn, scale), inf
-    if len(arms) <= 2:  # more of them need not all reach it
+    moved, as_it_is = (_astray(own, arms, factors, at) for at in (complex(x, y), 0j))
+    if len(arms) > 1 and abs(turn) < pi / 2 and as_it_is < moved - _ASTRAY:
+        x, y, turn = 0.0, 0.0, 0.0
+    elif len(arms) <= 2:  # more of them need not all reach it
         bodies = {layout.owner(place) for place in declared.places}
         near = (x, y) if len(bodies) == len(arms) else None  # limbs reach where their body has them
         if (shared := shared_place(layout, tuple(declared.places), table, near=near)) is None:
@@ -109,6 +114,14 @@ def _origin(
     return round(float(at.real), _DIGITS) + 0.0, round(float(at.imag), _DIGITS) + 0.0
 
 
+def _astray(
+    own: Sequence[Placement], arms: Sequence[Placement], factors: Sequence[float], origin: complex
+) -> float:
+    """Return by how much arms stand farther from an origin, or nearer, than they are to (m)."""
+    wanted = np.array(factors) * np.abs(_flat(own))
+    return float(np.abs(np.abs(_flat(arms) - origin) - wanted).max())
+
+
 def _flat(bases: Sequence[Placement]) -> NDArray[np.complex128]:
     """Return the bases of arms in the plane, x + iy (m)."""
     return np.array([complex(*arm.base_position[:2]) for arm in bases])
@@ -116,10 +129,15 @@ def _flat(bases: Sequence[Placement]) -> NDArray[np.complex128]:
 
 def _alike(arm: Placement, own: Placement) -> bool:
     """Return whether an arm stands where a task's own does, and reaches and holds as much."""
-    if arm.robot == own.robot:
-        return arm.base_pose == own.base_pose
-    same = (arm.base_pose, arm.robot.reach) == (own.base_pose, own.robot.reach)
-    return same and _opening(arm.robot) == _opening(own.robot)
+    return arm.base_pose == own.base_pose and _able(arm, own)
+
+
+def _able(arm: Placement, own: Placement) -> bool:
+    """Return whether an arm reaches and holds as much as a task's own."""
+    one, other = arm.robot, own.robot
+    if one == other:
+        return True
+    return one.reach == other.reach and _opening(one) == _opening(other)
 
 
 def _opening(robot: RobotDescriptor) -> float | None:

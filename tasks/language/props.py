@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, pi, sin
 
 import numpy as np
@@ -153,9 +154,16 @@ def target_shapes(radius: float) -> tuple[Shape, ...]:
     )
 
 
-def wide_table_outline(layout: Layout) -> tuple[float, float, float, float]:
-    """Return the outline of that table's top: x_min, y_min, x_max, y_max (m)."""
-    bases = np.array([placement.base_position[:2] for placement in layout.values()])
+def wide_table_outline(
+    layout: Layout, others: Sequence[tuple[float, float]] = ()
+) -> tuple[float, float, float, float]:
+    """Return the outline of that table's top: x_min, y_min, x_max, y_max (m).
+
+    Args:
+        layout: The robots on it.
+        others: Places that it lies under like under bases, x and y (m).
+    """
+    bases = np.array([*(placement.base_position[:2] for placement in layout.values()), *others])
     (x_min, y_min), (x_max, y_max) = bases.min(0) - TABLE_MARGIN, bases.max(0) + TABLE_MARGIN
     return float(x_min), float(y_min), float(x_max), float(y_max)
 
@@ -182,15 +190,16 @@ def add_kitchen_counter(world: World, scale: float = 1.0) -> None:
     add_ground(world)
 
 
-def add_wide_table(world: World) -> None:
+def add_wide_table(world: World, others: Sequence[tuple[float, float]] = ()) -> None:
     """Add a table under all robots of a layout, its top at z = 0, and the floor below it.
 
     It ends `TABLE_MARGIN` beyond the outermost bases.
 
     Args:
         world: The world; its layout says where the bases are.
+        others: Places that it lies under like under bases, x and y (m).
     """
-    x_min, y_min, x_max, y_max = wide_table_outline(world.layout)
+    x_min, y_min, x_max, y_max = wide_table_outline(world.layout, others)
     x, half_x = (x_min + x_max) / 2, (x_max - x_min) / 2
     y, half_y = (y_min + y_max) / 2, (y_max - y_min) / 2
     slab = Box(half_size=(half_x, half_y, TABLE_THICKNESS / 2), color=WOOD)

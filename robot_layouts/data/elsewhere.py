@@ -1,0 +1,161 @@
+"""``robot-layouts tasks elsewhere``: other places to stand for the robots of a task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from typing import Annotated, Any
+
+import numpy as np
+
+from layouts import Layout, search
+from robot_layouts.core.cli import Count, File, Seed, Word
+from robot_layouts.core.progress import Progress
+from robot_layouts.experts import find_expert
+from robot_layouts.kinematics.rotations import Floats
+from robots import TaskError
+from tasks import TaskEnv, make
+from tasks.cell_options import RecordedCell
+from tasks.episode import play
+
+SPOTS = 8  # poses of each TCP that its arm has to reach
+_LOW = 0.12  # m above the lowest place of a TCP, that is where its arm works
+_APART = 0.04  # m between poses, at least
+_CLEAR = 0.1  # m that bases keep from the poses
+CLEARANCE = 0.3  # m that robots keep from each other, so that they do not work in each other's way
+
+
+def stand_elsewhere(
+    task: str,
+    *,
+    seed: int = 0,
+    episodes: int = 5,
+    clearance: float = CLEARANCE,
+    tries: int = 4,
+    tell: Callable[[str], None] = lambda what: None,
+    **making: Any,
+) -> Layout:
+    """Look for other places from which a task's robots can do what its expert lets them do.
+
+    The expert solves the first episodes where the robots stand. Of each arm the most different
+    poses of its TCP, near the lowest, are what it has to reach; `layouts.search` does the rest. The
+    same arguments give the same layout, and `tasks.make` takes it: ``make(task, layout=…)``.
+
+    Args:
+        task: Its id or another of its names.
+        seed: Of the search; another one gives other places.
+        episodes: How many episodes the expert plays, from seed 0 on.
+        clearance: See `layouts.search`.
+        tries: Likewise.
+        tell: Told what is done, to show progress.
+        making: Arguments of `tasks.make`: ``robots``, ``layout``.
+
+    Raises:
+        UnknownNameError: If the task, a place or a robot is unknown.
+        TaskError: If the task cannot be made like that, has no expert, or it solves no episode.
+        LayoutError: If no other places are found.
+        MissingPackageError: If python-fcl or scipy is not installed.
+    """
+    with closing(make(task, obs_mode="none", **making)) as env:
+        layout = env.layout
+        spots = {
+            arm: _most_different(poses)
+            for arm, poses in _poses(task, env, range(episodes), tell).items()
+        }
+    targets = {f"{arm} {i}": pose for arm, poses in spots.items() for i, pose in enumerate(poses)}
+    places = np.array([pose[:2] for pose in targets.values()])
+    low, high = places.min(axis=0) - _CLEAR, places.max(axis=0) + _CLEAR
+    return search(
+        {name: placement.robot for name, placement in layout.items()},
+        targets,
+        around=(*low.tolist(), *high.tolist()),
+        heights={name: placement.base_position[2] for name, placement in layout.items()},
+        reached_by={f"{arm} {i}": arm for arm, poses in spots.items() for i in range(len(poses))},
+        clearance=clearance,
+        seed=seed,
+        tries=tries,
+    )
+
+
+def _poses(
+    task: str, env: TaskEnv, seeds: Sequence[int], tell: Callable[[str], None]
+) -> dict[str, Floats]:
+    """Return the poses of each arm's TCP in the episodes that a task's expert solves, (n, 7)."""
+    expert = find_expert(task)
+    found: dict[str, list[Floats]] = {arm: [] for arm in env.arms}
+    for seed in seeds:
+        tell(f"the expert's plan of seed {seed}")
+        seen: dict[str, list[Floats]] = {arm: [] for arm in env.arms}
+
+        def watch(seen: dict[str, list[Floats]] = seen) -> None:
+            state = env.simulation.read()
+            for arm, poses in seen.items():
+                poses.append(np.asarray(state.tcp_pose(arm)[0], float))
+
+        try:
+            solved = play(env, seed, expert(env, seed), watch).solved
+        except TaskError:  # there is no plan
+            continue
+        for arm, poses in seen.items():
+            found[arm] += poses if solved else []
+    if not any(found.values()):
+        raise TaskError(f"the expert of {task} solves none of {len(seeds)} episodes as it stands")
+    return {arm: np.array(poses) for arm, poses in found.items()}
+
+
+def _most_different(poses: Floats) -> list[tuple[float, ...]]:
+    """Return those of an arm's poses, (n, 7), that lie farthest from each other where it works."""
+    low = poses[poses[:, 2] < poses[:, 2].min() + _LOW]
+    away = np.linalg.norm(low[:, :3] - low[:, :3].mean(axis=0), axis=1)
+    chosen = list[Floats]()
+    while len(chosen) < SPOTS and (not chosen or away.max() > _APART):
+        chosen.append(low[away.argmax()])
+        to_it = np.linalg.norm(low[:, :3] - chosen[-1][:3], axis=1)
+        away = to_it if len(chosen) == 1 else np.minimum(away, to_it)
+    return [tuple(pose.tolist()) for pose in chosen]
+
+
+def elsewhere(
+    task: str,
+    *,
+    seed: Seed = 0,
+    episodes: Count = 5,
+    clearance: Annotated[float, Word("M")] = CLEARANCE,
+    tries: Count = 4,
+    out: File | None = None,
+    picture: File | None = None,
+    cell: RecordedCell,
+) -> None:
+    """Look for other places from which the robots of a task can do what its expert does.
+
+    `robot-layouts tasks check TASK --layout FILE` shows whether it does.
+
+    Args:
+        task: Task id or another of its names; MODULE:ID for one of your own.
+        seed: Seed of the search; another one gives other places.
+        episodes: How many episodes the expert plays to show what has to be reached.
+        clearance: Least distance between robots.
+        tries: Number of placements to begin from; more take longer.
+        out: Write the layout as YAML.
+        picture: Save a view (.png, .pdf or .svg).
+        cell: Its robots, and where they stand now.
+
+    Raises:
+        RobotLayoutsError: If the task cannot be made, its expert solves nothing, or no other places
+            are found.
+    """
+    tell = Progress(work=f"places for {task}").tell
+    layout = stand_elsewhere(
+        task,
+        seed=seed,
+        episodes=episodes,
+        clearance=clearance,
+        tries=tries,
+        tell=tell,
+        **cell.making(),
+    )
+    print(layout)
+    if out is not None:
+        print(f"layout: {layout.save(out)}")
+    if picture is not None:
+        print(f"picture: {layout.validate().picture(picture)}")
