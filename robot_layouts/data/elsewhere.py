@@ -82,10 +82,10 @@ def _poses(
 ) -> dict[str, Floats]:
     """Return the poses of each arm's TCP in the episodes that a task's expert solves, (n, 7)."""
     expert = find_expert(task)
-    found: dict[str, list[Floats]] = {arm: [] for arm in env.arms}
+    found: dict[str, list[Floats]] = {arm: [] for arm in env.layout.arms}
     for seed in seeds:
         tell(f"the expert's plan of seed {seed}")
-        seen: dict[str, list[Floats]] = {arm: [] for arm in env.arms}
+        seen: dict[str, list[Floats]] = {arm: [] for arm in env.layout.arms}
 
         def watch(seen: dict[str, list[Floats]] = seen) -> None:
             state = env.simulation.read()

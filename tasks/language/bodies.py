@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import cos, isfinite, sin
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias, TypedDict
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypedDict
 
 from layouts import Layout
 from objects import ObjectDescriptor, ObjectRegistry
@@ -479,7 +479,7 @@ class Surroundings(ABC):
         """
         return None
 
-    def under(self, layout: Layout, places: Sequence[tuple[float, float]]) -> Self:
+    def under(self, layout: Layout, places: Sequence[tuple[float, float]]) -> Surroundings:
         """Return what robots stand in that also lies under places, x and y (m); mostly the same."""
         return self
 
@@ -529,7 +529,7 @@ class WideTable(Surroundings):
         """Return the outline of its top: x_min, y_min, x_max, y_max (m)."""
         return wide_table_outline(layout, self.others)
 
-    def under(self, layout: Layout, places: Sequence[tuple[float, float]]) -> Self:
+    def under(self, layout: Layout, places: Sequence[tuple[float, float]]) -> Surroundings:
         """Return the table that also lies under places, x and y (m)."""
         x_min, y_min, x_max, y_max = self.outline(layout)
         on_it = all(x_min <= x <= x_max and y_min <= y <= y_max for x, y in places)

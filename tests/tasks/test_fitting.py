@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tasks
-from layouts import Layout, at_task, face_to_face, side_by_side
+from layouts import Layout, Placement, at_task, face_to_face, side_by_side
 from layouts.shared_place import shared_place
 from robots import TaskError
 from tasks.language.fitting import AS_DECLARED
@@ -104,3 +104,47 @@ def test_one_robot_stands_in_all_places():
     task = tasks.get_task_class("TwoRobotHandOver-v1")
     one = make_scenario(task, robots="so101").layout
     assert one == make_scenario(task, robots={"left": "so101", "right": "so101"}).layout
+
+
+FOUND = {"packer": ((-0.432, 0.077, 0.0), -1.2), "closer": ((-0.254, 0.5, 0.0), -0.08)}
+
+
+def found_elsewhere() -> Layout:
+    """Return the packer and the closer both to the left of what they work on."""
+    own = tasks.get_task_class("CellPutAndClose-v1").layout
+    return Layout(
+        {
+            name: Placement(own[name].robot, at, rpy=(0.0, 0.0, yaw))
+            for name, (at, yaw) in FOUND.items()
+        }
+    )
+
+
+def test_what_is_declared_stays_where_all_arms_reach_it_from_other_places():
+    env = tasks.make("CellPutAndClose-v1", layout=found_elsewhere())
+    assert env.task.fit == AS_DECLARED
+    own = tasks.make("CellPutAndClose-v1")
+    for seed in range(3):
+        for each in (env, own):
+            each.reset(seed)
+        assert np.array_equal(env.state.pose("cube"), own.state.pose("cube"))
+
+
+def test_the_table_is_also_where_a_task_is_declared_to_work():
+    """The cube, beyond the table under these two arms alone, rests on it."""
+    env = tasks.make("CellPutAndClose-v1", layout=found_elsewhere())
+    env.reset(0)
+    for _ in range(10):
+        env.step(np.zeros(env.action_space.shape, np.float32))
+    x, y, z = env.state.position("cube")[0].tolist()
+    assert z == pytest.approx(0.02, abs=1e-3)
+    plain = env.task_class.table.outline(env.layout)
+    assert y < plain[1]
+    own = env.task_class.layout
+    assert env.task_class.table.under(own, [(0.0, 0.5)]) is env.task_class.table
+
+
+def test_its_own_robots_in_other_places_hold_what_they_hold():
+    """The can is as wide as a Panda holds, and wider than what other hands of its opening get."""
+    layout = face_to_face({"opener": "panda", "packer": "panda_wristcam"}, spacing=1.5)
+    assert tasks.make("CellPutAway-v1", layout=layout).task.fit.scale == 1.0
