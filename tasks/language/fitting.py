@@ -44,7 +44,7 @@ def fit_to(
     farther than its place needs, or than the one of the task's own that reaches least, unless that
     is more than grippers can hold or than there is room. Its origin lies where it does in
     `layouts.at_task`, or, if it is for two arms or one, where they reach well, as near to that as
-    they do.
+    they do. It stays as declared where arms stand better about that.
 
     Args:
         layout: The robots that are to do the task.
@@ -71,11 +71,11 @@ def fit_to(
     turn = _turn(own, arms)
     (x, y), room = _origin(own, arms, factors, turn, scale), inf
     moved, as_it_is = (_astray(own, arms, factors, at) for at in (complex(x, y), 0j))
-    if len(arms) > 1 and abs(turn) < pi / 2 and as_it_is < moved - _ASTRAY:
+    apart = len({layout.owner(place) for place in declared.places}) == len(arms) > 1
+    if apart and abs(turn) < pi / 2 and as_it_is < moved - _ASTRAY:
         x, y, turn = 0.0, 0.0, 0.0
     elif len(arms) <= 2:  # more of them need not all reach it
-        bodies = {layout.owner(place) for place in declared.places}
-        near = (x, y) if len(bodies) == len(arms) else None  # limbs reach where their body has them
+        near = (x, y) if apart or len(arms) == 1 else None  # limbs reach where their body has them
         if (shared := shared_place(layout, tuple(declared.places), table, near=near)) is None:
             robots = {place: layout.arm(place).robot.name for place in declared.places}
             names = ", ".join(f"{place!r} ({robot})" for place, robot in robots.items())
