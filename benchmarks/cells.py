@@ -106,7 +106,8 @@ def cells(
         pairs=_matrix(record["pairs"]),
         mixed=mixed,
         elsewhere=[
-            (task, *map(_of, of.values())) for task, of in sorted(record["elsewhere"].items())
+            (task, *(_of(seen) if "scale" in seen else "none found" for seen in of.values()))
+            for task, of in sorted(record["elsewhere"].items())
         ],
         failures=failures,
     )
