@@ -12,6 +12,7 @@ from layouts import Layout, search
 from robot_layouts.core.cli import Count, File, Seed, Word
 from robot_layouts.core.progress import Progress
 from robot_layouts.experts import find_expert
+from robot_layouts.experts.reaching import POSE_JOINTS
 from robot_layouts.kinematics.rotations import Floats
 from robots import TaskError
 from tasks import TaskEnv, make
@@ -19,6 +20,7 @@ from tasks.cell_options import RecordedCell
 from tasks.episode import play
 
 SPOTS = 8  # poses of each TCP that its arm has to reach
+# For a task's own robots; with others they are as much larger or smaller as what they do.
 _LOW = 0.12  # m above the lowest place of a TCP, that is where its arm works
 _APART = 0.04  # m between poses, at least
 _CLEAR = 0.1  # m that bases keep from the poses
@@ -30,7 +32,7 @@ def stand_elsewhere(
     *,
     seed: int = 0,
     episodes: int = 5,
-    clearance: float = CLEARANCE,
+    clearance: float | None = None,
     tries: int = 4,
     tell: Callable[[str], None] = lambda what: None,
     **making: Any,
@@ -38,15 +40,17 @@ def stand_elsewhere(
     """Look for other places from which a task's robots can do what its expert lets them do.
 
     The expert solves the first episodes where the robots stand. Of each arm the most different
-    poses of its TCP, near the lowest, are what it has to reach; `layouts.search` does the rest. The
-    same arguments give the same layout, and `tasks.make` takes it: ``make(task, layout=…)``.
+    poses of its TCP, near the lowest, are what it has to reach, or their places if it has fewer
+    than six joints; `layouts.search` does the rest. The same arguments give the same layout, and
+    `tasks.make` takes it: ``make(task, layout=…)``.
 
     Args:
         task: Its id or another of its names.
         seed: Of the search; another one gives other places.
         episodes: How many episodes the expert plays, from seed 0 on.
-        clearance: See `layouts.search`.
-        tries: Likewise.
+        clearance: See `layouts.search`; 0.3 m for a task's own robots if not given, and for smaller
+            ones as much less as what they do is smaller.
+        tries: See `layouts.search`.
         tell: Told what is done, to show progress.
         making: Arguments of `tasks.make`: ``robots``, ``layout``.
 
@@ -57,21 +61,26 @@ def stand_elsewhere(
         MissingPackageError: If python-fcl or scipy is not installed.
     """
     with closing(make(task, obs_mode="none", **making)) as env:
-        layout = env.layout
+        layout, scale = env.layout, env.task.fit.scale
         spots = {
-            arm: _most_different(poses)
+            arm: _most_different(poses, scale)
             for arm, poses in _poses(task, env, range(episodes), tell).items()
         }
-    targets = {f"{arm} {i}": pose for arm, poses in spots.items() for i, pose in enumerate(poses)}
+    targets = {
+        f"{arm} {i}": pose if len(layout.arm(arm).robot.arm_joints) >= POSE_JOINTS else pose[:3]
+        for arm, poses in spots.items()
+        for i, pose in enumerate(poses)
+    }
     places = np.array([pose[:2] for pose in targets.values()])
-    low, high = places.min(axis=0) - _CLEAR, places.max(axis=0) + _CLEAR
+    clear = scale * _CLEAR
+    low, high = places.min(axis=0) - clear, places.max(axis=0) + clear
     return search(
         {name: placement.robot for name, placement in layout.items()},
         targets,
         around=(*low.tolist(), *high.tolist()),
         heights={name: placement.base_position[2] for name, placement in layout.items()},
         reached_by={f"{arm} {i}": arm for arm, poses in spots.items() for i in range(len(poses))},
-        clearance=clearance,
+        clearance=scale * CLEARANCE if clearance is None else clearance,
         seed=seed,
         tries=tries,
     )
@@ -103,12 +112,12 @@ def _poses(
     return {arm: np.array(poses) for arm, poses in found.items()}
 
 
-def _most_different(poses: Floats) -> list[tuple[float, ...]]:
+def _most_different(poses: Floats, scale: float = 1.0) -> list[tuple[float, ...]]:
     """Return those of an arm's poses, (n, 7), that lie farthest from each other where it works."""
-    low = poses[poses[:, 2] < poses[:, 2].min() + _LOW]
+    low = poses[poses[:, 2] < poses[:, 2].min() + scale * _LOW]
     away = np.linalg.norm(low[:, :3] - low[:, :3].mean(axis=0), axis=1)
     chosen = list[Floats]()
-    while len(chosen) < SPOTS and (not chosen or away.max() > _APART):
+    while len(chosen) < SPOTS and (not chosen or away.max() > scale * _APART):
         chosen.append(low[away.argmax()])
         to_it = np.linalg.norm(low[:, :3] - chosen[-1][:3], axis=1)
         away = to_it if len(chosen) == 1 else np.minimum(away, to_it)
@@ -120,7 +129,7 @@ def elsewhere(
     *,
     seed: Seed = 0,
     episodes: Count = 5,
-    clearance: Annotated[float, Word("M")] = CLEARANCE,
+    clearance: Annotated[float, Word("M")] | None = None,
     tries: Count = 4,
     out: File | None = None,
     picture: File | None = None,
@@ -134,7 +143,7 @@ def elsewhere(
         task: Task id or another of its names; MODULE:ID for one of your own.
         seed: Seed of the search; another one gives other places.
         episodes: How many episodes the expert plays to show what has to be reached.
-        clearance: Least distance between robots.
+        clearance: Least distance between robots (0.3 for the task's own, less for smaller ones).
         tries: Number of placements to begin from; more take longer.
         out: Write the layout as YAML.
         picture: Save a view (.png, .pdf or .svg).

@@ -21,6 +21,7 @@ def test_an_arm_has_to_reach_the_poses_that_lie_farthest_apart_where_it_works():
     assert {0.0, 1.0} <= {*spots[:, 0]}
     assert (spots[:, 2] == 0.0).all()
     assert len(_most_different(line[:4])) == 1  # three centimetres are one place
+    assert len(_most_different(line[:4], 0.5)) == 2  # for arms half as large they are two
 
 
 class ElsewhereReach(MultiRobotTask):
