@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import product
 from math import pi, remainder, sqrt
 
 import numpy as np
@@ -13,7 +14,7 @@ from robot_layouts.experts.grips import Grip, role_grip
 from robot_layouts.experts.hands import Hand
 from robot_layouts.experts.script import CLOSED, OPEN, Scene, Waypoint
 from robot_layouts.experts.tips import pose_solver
-from robot_layouts.experts.ways import NoWayError, Ways
+from robot_layouts.experts.ways import CANDIDATES, MANY, NoWayError, Ways
 from robot_layouts.kinematics.rotations import Floats, inverse, rotate
 from robot_layouts.kinematics.solve import by_way
 from robot_layouts.simulation.checks.overlaps import RobotsAlone
@@ -33,6 +34,9 @@ FIRM = 10  # control steps that they close on after they feel a thing: drives pr
 # What is pushed slides on by v² / 2µg (m): 2µg of bodies on a table (m/s²), and the share of its
 # way that a push may lack, unless it stands for so many control steps.
 SLOWS, LACKING, STANDS = 2 * 0.3 * 9.81, 0.3, 3
+ALL_ROUND = tuple(pi / 4 * k for k in range(1, 8))  # rad
+ALIKE = 0.1  # rad: postures whose joints differ less are one
+EXACT, RESTING = 0.01, 0.005  # rad from a pose, and per control step, when a careful arm goes on
 AGAIN, WAITING = 4, 100  # control steps after which an arm that waits looks again, and gives up
 
 
@@ -76,6 +80,7 @@ class Player:
         waypoints: Sequence[Waypoint],
         scene: Scene,
         alone: RobotsAlone,
+        careful: bool = False,
     ) -> None:
         """Take a robot and what it is to do.
 
@@ -85,6 +90,7 @@ class Player:
             waypoints: What it does, one thing after the other.
             scene: As it is now.
             alone: Tells whether it is inside itself.
+            careful: Whether it comes to rest at each pose before it goes on.
         """
         self._robot, self._waypoints = robot, list(waypoints)
         self._driver = ArmDriver(task.layout.arm(robot).robot, 1 / task.scenario.control_frequency)
@@ -99,6 +105,7 @@ class Player:
             self._base = scene.base(robot)
         self._jaws = _Jaws(task, robot, grip) if (grip := role_grip(task, robot)) else None
         self._goal = self._start = self._driver.arm(scene.qpos(robot))
+        self._careful, self._before = careful, self._goal
         self._gripper: float = OPEN
         self._share: float | None = None
         self._squeeze: float | Callable[[Scene], float] | None = None
@@ -204,9 +211,12 @@ class Player:
         if self._elapsed < waypoint.steps:
             return False
         moves = any((waypoint.to, waypoint.turn, waypoint.at, waypoint.joints))
+        careful = self._careful and waypoint.to is not None
+        moved, self._before = self._arm(scene) - self._before, self._arm(scene)
         if moves:
             away = np.abs(self._arm(scene) - self._goal).max()
-            if self._later or away > waypoint.near:
+            near = min(waypoint.near, EXACT) if careful else waypoint.near
+            if self._later or away > near or (careful and np.abs(moved).max() > RESTING):
                 self._check_progress(float(away))
                 return False
             lacks = waypoint.pushes and self._left(scene) > LACKING * self._stroke
@@ -241,7 +251,7 @@ class Player:
         goals = self._goals(name, waypoint, scene)
         self._start = self._goal
         if goals and self._ways is not None:
-            way = self._free_way(name, goals, scene)
+            way = self._free_way(name, goals, waypoint, scene)
             if way is None:
                 return
             self._goal, *self._later = way
@@ -281,7 +291,9 @@ class Player:
             raise StuckError(f"{name} is out of reach")
         return by_way(goals, arm)
 
-    def _free_way(self, name: str, goals: Sequence[Floats], scene: Scene) -> list[Floats] | None:
+    def _free_way(
+        self, name: str, goals: Sequence[Floats], waypoint: Waypoint, scene: Scene
+    ) -> list[Floats] | None:
         """Return a way that touches nothing; None while others have to move on before.
 
         Raises:
@@ -295,11 +307,40 @@ class Player:
         try:
             way = self._ways.find(self._robot, goals, scene, ahead)
         except NoWayError as error:
-            if self._delayed > WAITING:
+            if self._delayed <= WAITING and not error.stays:
+                return None
+            try:
+                others = self._others_than(goals, waypoint, scene)
+                way = self._ways.find(self._robot, others, scene, ahead, MANY)
+            except NoWayError:
                 raise BlockedError(f"{name} is blocked: {error}") from error
-            return None
         self._delayed = 0
         return list(way)
+
+    def _others_than(
+        self, goals: Sequence[Floats], waypoint: Waypoint, scene: Scene
+    ) -> list[Floats]:
+        """Return more arm joints that a waypoint to a pose may end at.
+
+        They are sought from the present ones with the first joint turned all round.
+
+        Args:
+            goals: Those that are known, each (arm joints,) (rad), the shortest way first.
+            waypoint: Where it goes.
+            scene: As it is now.
+        """
+        if waypoint.to is None:
+            return []
+        qpos, first, more = scene.qpos(self._robot), self._own[0], list[Floats]()
+        for turn, pose in product(ALL_ROUND, waypoint.to(scene)):
+            start = qpos.copy()
+            start[first] += turn
+            more += self._kinematics.solutions(*pose, start)
+        found = list(goals[:CANDIDATES])
+        for goal in (*goals[CANDIDATES:], *by_way(more, self._arm(scene))):
+            if all(np.abs(goal - known).max() > ALIKE for known in found):
+                found.append(goal)
+        return found[CANDIDATES:]
 
     def _is_free(self, goal: Floats, scene: Scene) -> bool:
         """Return whether the robot is not inside itself with the arm at a goal."""

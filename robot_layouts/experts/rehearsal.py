@@ -132,7 +132,14 @@ class Rehearsal:
         episode = self._tape.read()
         return episode if np.array_equal(episode.actions, actions) else None
 
-    def play(self, script: Script, *, around: bool = False, until: str | None = None) -> Attempt:
+    def play(
+        self,
+        script: Script,
+        *,
+        around: bool = False,
+        careful: bool = False,
+        until: str | None = None,
+    ) -> Attempt:
         """Play a script from the present state until success or the end of the episode.
 
         It fails as soon as two arms touch, robots or limbs of one robot, or the task is lost.
@@ -141,6 +148,7 @@ class Rehearsal:
             script: Waypoints by robot; robots left out keep still.
             around: Whether arms go round what is in their way, or wait until it is gone. Otherwise
                 their joints go straight to each waypoint.
+            careful: Whether they come to rest at each pose before they go on.
             until: A waypoint, ``"robot.name"``; once it is done, that is success.
 
         Raises:
@@ -150,7 +158,7 @@ class Rehearsal:
         """
         task, scene = self.task, self.scene()
         _check_names(script, task)
-        players = _players(task, script, scene, self._alone)
+        players = _players(task, script, scene, self._alone, careful)
         if around:
             ways = Ways(task)
             for player in players:
@@ -191,12 +199,14 @@ def rehearsing(task: TaskEnv) -> Generator[Rehearsal]:
     _idle[task] = rehearsal
 
 
-def _players(task: TaskEnv, script: Script, scene: Scene, alone: RobotsAlone) -> list[Player]:
+def _players(
+    task: TaskEnv, script: Script, scene: Scene, alone: RobotsAlone, careful: bool
+) -> list[Player]:
     """Return who takes the action numbers, in their order, by the names that the script uses."""
     short = task.layout.short_names
     names = {short.get(name, name): name for name in script}
     return [
-        Player(task, name, script.get(name, ()), scene, alone)
+        Player(task, name, script.get(name, ()), scene, alone, careful)
         for name in (names.get(part, part) for part in task.layout.action_split)
     ]
 
@@ -238,13 +248,15 @@ def tried(
 ) -> Iterator[Attempt]:
     """Yield an attempt with each script in turn, then with ways round what was in the way.
 
+    Last comes one with each script in which arms come to rest before they go on.
+
     Args:
         rehearsal: Where they are tried; each begins the episode anew.
         seed: The episode.
         scripts: The scripts, the best first; attempts that failed while they were looked for are
             yielded as they are.
     """
-    obstructed: list[Script] = []
+    obstructed, failed = list[Script](), list[Script]()
     for script in scripts:
         if isinstance(script, Attempt):
             yield script
@@ -252,14 +264,18 @@ def tried(
         if not rehearsal.fresh:
             rehearsal.begin(seed)
         attempt = rehearsal.play(script)
+        if not attempt.success and any(w.to for part in script.values() for w in part):
+            failed.append(script)
         if attempt.obstructed:
             obstructed.append(script)
             attempt = replace(attempt, reason=attempt.reason + without_planner())
         yield attempt
-    if not without_planner():
-        for script in obstructed:
+    if without_planner():
+        return
+    for careful, again in ((False, obstructed), (True, failed)):
+        for script in again:
             rehearsal.begin(seed)
-            yield rehearsal.play(script, around=True)
+            yield rehearsal.play(script, around=True, careful=careful)
 
 
 def search(task: TaskEnv, seed: int, attempts: Callable[[Rehearsal], Iterable[Attempt]]) -> Plan:

@@ -24,10 +24,11 @@ from tasks import TaskEnv
 
 CLEARANCE = 0.02  # m
 RESOLUTION: Resolution = (0.02, 0.1)  # m and rad
+ROUNDING = 0.004  # m by which a hand may overlap what stands where it goes
 SHARES = np.linspace(0.0, 1.0, 5)  # of their ways, at which arms that move too are checked
 STANDING = 0.02  # rad: an arm that has less to go stands
 SHORT = 0.4  # rad: a way that long at most, from or to a body, is only made straight
-CANDIDATES = 8  # postures at the goal that are checked
+CANDIDATES, MANY = 8, 40  # postures at the goal that are checked; where there is no other way
 SOUGHT = 2  # postures at the goal to which a way round is sought
 CHECKS = 600  # lines and postures that a search may check
 
@@ -43,7 +44,16 @@ def without_planner() -> str:
 
 
 class NoWayError(Exception):
-    """There is no way now; says what is in the way."""
+    """There is no way now; says what is in the way.
+
+    Attributes:
+        stays: Whether nothing of that moves on, so that waiting is no use.
+    """
+
+    def __init__(self, message: str, *, stays: bool = False) -> None:
+        """Take the reason."""
+        super().__init__(message)
+        self.stays = stays
 
 
 class Ways:
@@ -64,7 +74,12 @@ class Ways:
         return name if name in self._columns else None
 
     def find(
-        self, arm: str, goals: Sequence[Floats], scene: Scene, ahead: Mapping[str, Floats]
+        self,
+        arm: str,
+        goals: Sequence[Floats],
+        scene: Scene,
+        ahead: Mapping[str, Floats],
+        candidates: int = CANDIDATES,
     ) -> Floats:
         """Return the points of a way that touches nothing, its start left out, (n, arm joints).
 
@@ -76,6 +91,7 @@ class Ways:
             scene: As it is now.
             ahead: What lies before the other arms, by name, (n, arm joints) (rad), beginning where
                 they are.
+            candidates: How many of the goals are looked at.
 
         Raises:
             MissingPackageError: If a way round is needed and the extra ``motion`` not installed.
@@ -83,14 +99,14 @@ class Ways:
         """
         query = self._query(self._layout.arm_name(arm), scene, ahead)
         places: list[_GoalPosture] = []
-        for goal in goals[:CANDIDATES]:
+        for goal in goals[:candidates]:
             if (place := query.place(goal)) is None:
                 continue
             if place.space.edge_free(query.start, goal, RESOLUTION):
                 return goal[None]
             places.append(place)
         if not places:
-            raise NoWayError(f"{query.trouble} at its end")
+            raise NoWayError(f"{query.trouble} at its end", stays=query.stays)
         for place in places[:SOUGHT]:
             points = query.way_round(place)
             if points is not None:
@@ -168,6 +184,7 @@ class _Query:
         """
         self._cell, self._columns, self._movable = cell, columns, movable
         self._robot = cell.layout.owner(arm)
+        self._passing = {*cell.robots, *movable} - {self._robot}
         hand = cell.hand(arm)
         held = {held.obstacle.name for held in cell.held if held.place == arm}
         links = {s.name for s in cell.solids if s.mover == self._robot and s.part in hand}
@@ -178,10 +195,13 @@ class _Query:
         self._at_body = self._allow(self._nearer, everywhere[0], leaving=True)
         later = [state for state in everywhere[1:] if self._forbidden(self._nearer, state) is None]
         self._everywhere = np.stack([everywhere[0], *later])
-        self.trouble = ""
+        self.trouble, self.stays = "", True
 
     def place(self, goal: Floats) -> _GoalPosture | None:
-        """Return a posture at the goal; None if something is in the way there, see `trouble`."""
+        """Return a posture at the goal; None if something is in the way there.
+
+        `trouble` says what, and `stays` whether it never was what moves on.
+        """
         nearer, states = dict(self._nearer), self._everywhere.copy()
         states[:, self._columns] = goal
         at_body = self._allow(nearer, states[0], leaving=False)
@@ -190,6 +210,7 @@ class _Query:
         contact = next((contact for contact in found if contact is not None), None)
         if contact is not None:
             self.trouble = str(contact)
+            self.stays &= self._passing.isdisjoint(contact.owners)
             return None
         short = bool(np.abs(goal - self.start).max() < SHORT)
         only_straight = (self._at_body or at_body) and short
@@ -226,8 +247,8 @@ class _Query:
         """Allow what may be nearer than usual in a state; return whether the hand is at a body.
 
         What is nearer than the clearance already may be so on the way. What physics moves may be
-        touched by the hand that is there; so may what it overlaps, which is by rounding, and what
-        the arm is to get away from.
+        touched by the hand that is there; so may what it overlaps by rounding, and what the arm is
+        to get away from.
         """
         at_body = False
         for contact in self._whole.contacts(state):
@@ -236,7 +257,8 @@ class _Query:
             of_hand = len(bodies) == 1 and bodies[0] in contact.owners
             at_body |= of_hand
             touches = of_hand and bodies[0] in self._movable
-            if touches or (contact.distance <= 0 and (of_hand or leaving)):
+            by_rounding = of_hand and contact.distance > -ROUNDING
+            if touches or (contact.distance <= 0 and (by_rounding or leaving)):
                 nearer[names] = -np.inf
             elif contact.distance > 0:
                 nearer.setdefault(names, 0.0)

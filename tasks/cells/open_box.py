@@ -49,7 +49,7 @@ def lever_box() -> ObjectDescriptor:
 class CellOpenBox(CellTask):
     """Hold the lid open by its lever until both cubes are in the box, then let it fall shut.
 
-    The box stands in the middle, up to 6 cm towards the opener or 2 cm away from it and 5 cm aside,
+    The box stands in the middle, up to 6 cm towards the opener or 2 cm away from it and 3 cm aside,
     its back towards the opener to 17°; the cubes lie 34 to 42 cm from the middle before their arms,
     up to 8 cm aside, turned at random. A spring shuts the lid.
 
@@ -76,7 +76,7 @@ class CellOpenBox(CellTask):
         """Stand the box before the opener, and lay a cube before each packer."""
         super().sample(world, rng)
         turned = (pi - 0.3, pi + 0.3)
-        self.lay_before(world, rng, "opener", "box", (-0.02, -0.05), (0.06, 0.05), turned)
+        self.lay_before(world, rng, "opener", "box", (-0.02, -0.03), (0.06, 0.03), turned)
         for arm in PACKERS:
             self.lay_before(world, rng, arm, f"cube_{arm}", (0.34, -0.08), (0.42, 0.08))
 

@@ -30,9 +30,10 @@ PACKERS = ("left", "right")
 class CellStowTwo(CellTask):
     """Stow both cubes in the drawer, which is shut before and after, and hold the button down.
 
-    The drawer stands before the opener, its front towards it, x in [-0.03, 0.03], y in [0.1, 0.14]
-    (m), the button behind it before the holder, 42 to 46 cm from the middle and up to 5 cm aside;
-    the cubes lie 34 to 40 cm from the middle before their arms, up to 5 cm aside, turned at random.
+    The drawer stands before the opener, its front towards it, x in [-0.02, 0.02], y in
+    [0.105, 0.13] (m), the button behind it before the holder, 42 to 46 cm from the middle and up to
+    5 cm aside; the cubes lie 34 to 40 cm from the middle before their arms, up to 5 cm aside,
+    turned at random.
 
     Success: both cubes are in the drawer, let go, and it is shut to 1.5 cm while the button is
     pressed by 5 mm.
@@ -53,7 +54,7 @@ class CellStowTwo(CellTask):
     viewpoint = ((1.2, -0.8, 1.1), (0.0, 0.0, 0.1))
 
     case = Object(
-        "drawer", kind="kinematic", spawn=Area(x=(-0.03, 0.03), y=(0.1, 0.14), yaw=-pi / 2)
+        "drawer", kind="kinematic", spawn=Area(x=(-0.02, 0.02), y=(0.105, 0.13), yaw=-pi / 2)
     )
     button = Object("button", kind="kinematic")
     cube_left, cube_right = Cube(HALF, RED), Cube(HALF, BLUE)
