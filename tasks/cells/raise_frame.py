@@ -43,7 +43,7 @@ class CellRaiseFrame(CellTask):
         "Each take the tab before you, then raise the frame in step.",
         "Raise the frame by all its tabs without tilting it.",
     )
-    layout = ring({f"arm{i}": robot for i, robot in enumerate(MAKES * 2)}, radius=0.95)
+    layout = ring({f"arm{i}": robot for i, robot in enumerate(MAKES * 2)}, radius=0.99)
     robot_counts = range(3, 9)
     needs = {"*": Needs(fingers=True, opening=2 * WIDE)}
     max_episode_steps = 120

@@ -205,6 +205,23 @@ def two_arms() -> Rehearsal:
     return Rehearsal(tasks.make("TwoRobotPickCube-v1"))
 
 
+@pytest.mark.parametrize(("careful", "farthest"), [(False, 0.5), (True, 0.01)])
+def test_a_careful_arm_comes_to_rest_before_it_goes_on(careful: bool, farthest: float):
+    begun: list[float] = []
+
+    def down(scene: Scene) -> list[Pose]:
+        place, quaternion = scene.tcp("arm")
+        begun.append(float(np.linalg.norm(place - over_cube(scene, 0.3)[0][0])))
+        return [(place - (0.0, 0.0, 0.05), quaternion)]
+
+    rehearsal = Rehearsal(tasks.make("PickCube-v1"))
+    rehearsal.begin(0)
+    over = Waypoint("over", partial(over_cube, above=0.3), near=0.3)
+    script = {"arm": (over, Waypoint("down", down))}
+    rehearsal.play(script, around=True, careful=careful)
+    assert farthest / 10 < begun[0] < farthest
+
+
 def test_a_waypoint_waits_for_another_robot(two_arms):
     """Without it the left arm opens its fingers at once; with it after 10 steps of the right."""
     two_arms.begin(0)

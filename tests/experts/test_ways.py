@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 import tasks
+from layouts import Layout, Placement
 from robot_layouts.experts import first_success
+from robot_layouts.experts.cells.tips import sweep
 from robot_layouts.experts.geometry import gripper_facing
 from robot_layouts.experts.rehearsal import Rehearsal
 from robot_layouts.experts.script import CLOSED, Pose, Scene, Waypoint
@@ -17,6 +19,7 @@ from robot_layouts.experts.tips import pose_solver
 from robot_layouts.experts.ways import NoWayError, Ways
 
 HALF_PI = np.pi / 2
+TIP = np.array([0.0, 0.05, 0.1])  # from a tap (m)
 MIDDLE = np.array([0.0, 0.0, 0.3])
 
 
@@ -120,6 +123,58 @@ def test_bodies_are_in_the_way_unless_the_hand_is_at_them():
 
     assert len(way_to(cube)) == 1
     assert len(way_to(beside[1])) > 1
+
+
+def test_only_what_moves_on_is_waited_for(two_arms: Rehearsal):
+    two_arms.begin(0)
+    two_arms.play({"left": (Waypoint("stand", at(MIDDLE), CLOSED),)})
+    scene, solver = two_arms.scene(), pose_solver(two_arms.task, "right")
+    below = np.array([0.0, 0.3, -0.1])
+    stays = {}
+    for name, place in (("arm", MIDDLE), ("table", below)):
+        goals = solver.solutions(place, gripper_facing(-HALF_PI, 0.0), scene.qpos("right"))
+        with pytest.raises(NoWayError) as refusal:
+            Ways(two_arms.task).find("right", goals, scene, {})
+        stays[name] = refusal.value.stays
+    assert stays == {"arm": False, "table": True}
+
+
+def test_a_hand_may_not_reach_into_the_table():
+    """It may touch the cube that it is at."""
+    rehearsal = Rehearsal(tasks.make("PickCube-v1"))
+    cube = rehearsal.begin(0).body("cube")[0]
+    rehearsal.play({"arm": (Waypoint("over", at(cube + (0.0, 0.0, 0.03), 0.0), CLOSED),)})
+    scene, solver = rehearsal.scene(), pose_solver(rehearsal.task, "arm")
+    turned = gripper_facing(0.0, 0.0)
+    low = solver.solutions(cube - (0.0, 0.0, 0.03), turned, scene.qpos("arm"))
+    with pytest.raises(
+        NoWayError, match=r"finger and the table-workspace overlap by .* at its end"
+    ):
+        Ways(rehearsal.task).find("arm", low, scene, {})
+    at_cube = solver.solutions(cube, turned, scene.qpos("arm"))
+    assert len(Ways(rehearsal.task).find("arm", at_cube, scene, {})) == 1
+
+
+def test_an_arm_looks_all_round_for_a_posture_that_is_free():
+    """From where it starts, this UR10's inverse kinematics finds its elbow in the table."""
+    places = {
+        "first": ("ur10", -0.274, -0.82, -3.142),
+        "second": ("panda_stick", 0.767, 0.298, -2.436),
+        "third": ("xarm7", -0.162, 0.79, -1.171),
+        "fourth": ("panda", -0.74, 0.472, -1.385),
+    }
+    layout = Layout(
+        {
+            arm: Placement(robot, (x, y, 0.0), rpy=(0.0, 0.0, yaw))
+            for arm, (robot, x, y, yaw) in places.items()
+        }
+    )
+    rehearsal = Rehearsal(tasks.make("CellTurnTaps-v1", layout=layout))
+    tap, _ = rehearsal.begin(1).body("tap_first")
+    over, *_ = sweep(rehearsal.task, "first", "tap_first", lambda scene, share: tap + TIP)
+    assert "is blocked" in rehearsal.play({"first": (over,)}).reason
+    rehearsal.begin(1)
+    assert rehearsal.play({"first": (over,)}, around=True, until=f"first.{over.name}").success
 
 
 def test_without_the_extra_the_reason_says_so(monkeypatch: pytest.MonkeyPatch):
