@@ -43,8 +43,8 @@ class CellSqueezeBox(CellTask):
     )
     layout = Layout(
         {
-            "west": Placement("panda", (-0.74, 0.0, 0.0)),
-            "east": Placement("franka_panda", (0.74, 0.0, 0.0), rpy=(0.0, 0.0, pi)),
+            "west": Placement("panda", (-0.7, 0.0, 0.0)),
+            "east": Placement("franka_panda", (0.7, 0.0, 0.0), rpy=(0.0, 0.0, pi)),
             "pusher": Placement("ur10", (0.0, -1.1, 0.0), rpy=(0.0, 0.0, pi / 2)),
         }
     )
