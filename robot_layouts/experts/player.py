@@ -307,12 +307,15 @@ class Player:
         try:
             way = self._ways.find(self._robot, goals, scene, ahead)
         except NoWayError as error:
-            if self._delayed <= WAITING and not error.stays:
+            last = self._delayed > WAITING
+            if not (last or (error.stays and self._delayed == 1)):
                 return None
             try:
                 others = self._others_than(goals, waypoint, scene)
                 way = self._ways.find(self._robot, others, scene, ahead, MANY)
             except NoWayError:
+                if not last:
+                    return None
                 raise BlockedError(f"{name} is blocked: {error}") from error
         self._delayed = 0
         return list(way)

@@ -47,7 +47,7 @@ class NoWayError(Exception):
     """There is no way now; says what is in the way.
 
     Attributes:
-        stays: Whether nothing of that moves on, so that waiting is no use.
+        stays: Whether nothing of that moves on; then other postures are looked for at once.
     """
 
     def __init__(self, message: str, *, stays: bool = False) -> None:

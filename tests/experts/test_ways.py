@@ -139,6 +139,16 @@ def test_only_what_moves_on_is_waited_for(two_arms: Rehearsal):
     assert stays == {"arm": False, "table": True}
 
 
+def test_a_place_in_the_table_is_waited_for_as_it_may_move(two_arms: Rehearsal):
+    def up_once_left_is_there(scene: Scene) -> list[Pose]:
+        there = np.linalg.norm(scene.tcp("left")[0] - MIDDLE) < 0.05
+        return [(np.array([0.0, 0.35, 0.4 if there else -0.1]), gripper_facing(-HALF_PI, 0.0))]
+
+    script = crossing() | {"right": (Waypoint("place", up_once_left_is_there, CLOSED),)}
+    two_arms.begin(0)
+    assert two_arms.play(script, around=True, until="right.place").success
+
+
 def test_a_hand_may_not_reach_into_the_table():
     """It may touch the cube that it is at."""
     rehearsal = Rehearsal(tasks.make("PickCube-v1"))
