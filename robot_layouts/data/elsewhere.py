@@ -4,26 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
 
-from layouts import Layout, search
+from layouts import Frame, Layout, search
 from robot_layouts.core.cli import Count, File, Seed, Word
 from robot_layouts.core.progress import Progress
 from robot_layouts.experts import find_expert
 from robot_layouts.experts.reaching import POSE_JOINTS
 from robot_layouts.kinematics.rotations import Floats
-from robots import TaskError
+from robots import LayoutError, TaskError
 from tasks import TaskEnv, make
 from tasks.cell_options import RecordedCell
 from tasks.episode import play
+from tasks.language.fitting import TASK
 
 SPOTS = 8  # poses of each TCP that its arm has to reach
 # For a task's own robots; with others they are as much larger or smaller as what they do.
 _LOW = 0.12  # m above the lowest place of a TCP, that is where its arm works
 _APART = 0.04  # m between poses, at least
 _CLEAR = 0.1  # m that bases keep from the poses
+_SEARCHES, _ENOUGH = 3, 0.8  # at most, until its expert solves that share of episodes from there
 CLEARANCE = 0.3  # m that robots keep from each other, so that they do not work in each other's way
 
 
@@ -41,13 +44,16 @@ def stand_elsewhere(
 
     The expert solves the first episodes where the robots stand. Of each arm the most different
     poses of its TCP, near the lowest, are what it has to reach, or their places if it has fewer
-    than six joints; `layouts.search` does the rest. The same arguments give the same layout, and
+    than six joints; `layouts.search` does the rest. Then it plays as many more episodes from where
+    they stand now: if it does not solve four of five, another search begins, up to three, and the
+    places from which it solves most are returned. The same arguments give the same layout, and
     `tasks.make` takes it: ``make(task, layout=…)``.
 
     Args:
         task: Its id or another of its names.
         seed: Of the search; another one gives other places.
-        episodes: How many episodes the expert plays, from seed 0 on.
+        episodes: How many episodes the expert plays where the robots stand, from seed 0 on, and
+            then from the places found, from seed ``episodes`` on.
         clearance: See `layouts.search`; 0.3 m for a task's own robots if not given, and for smaller
             ones as much less as what they do is smaller.
         tries: See `layouts.search`.
@@ -57,13 +63,13 @@ def stand_elsewhere(
     Raises:
         UnknownNameError: If the task, a place or a robot is unknown.
         TaskError: If the task cannot be made like that, has no expert, or it solves no episode.
-        LayoutError: If no other places are found.
+        LayoutError: If no other places are found, or it solves no episode from them.
         MissingPackageError: If python-fcl or scipy is not installed.
     """
     with closing(make(task, obs_mode="none", **making)) as env:
-        layout, scale = env.layout, env.task.fit.scale
+        layout, fit = env.layout, env.task.fit
         spots = {
-            arm: _most_different(poses, scale)
+            arm: _most_different(poses, fit.scale)
             for arm, poses in _poses(task, env, range(episodes), tell).items()
         }
     targets = {
@@ -71,19 +77,48 @@ def stand_elsewhere(
         for arm, poses in spots.items()
         for i, pose in enumerate(poses)
     }
+    reached_by = {f"{arm} {i}": arm for arm, poses in spots.items() for i in range(len(poses))}
     places = np.array([pose[:2] for pose in targets.values()])
-    clear = scale * _CLEAR
+    clear = fit.scale * _CLEAR
     low, high = places.min(axis=0) - clear, places.max(axis=0) + clear
-    return search(
+    searched = partial(
+        search,
         {name: placement.robot for name, placement in layout.items()},
         targets,
         around=(*low.tolist(), *high.tolist()),
         heights={name: placement.base_position[2] for name, placement in layout.items()},
-        reached_by={f"{arm} {i}": arm for arm, poses in spots.items() for i in range(len(poses))},
-        clearance=scale * CLEARANCE if clearance is None else clearance,
-        seed=seed,
+        reached_by=reached_by,
+        clearance=fit.scale * CLEARANCE if clearance is None else clearance,
         tries=tries,
     )
+    stays = {TASK: Frame((fit.x, fit.y, 0.0), rpy=(0.0, 0.0, fit.yaw))}
+    best, most = layout, 0
+    for number in range(_SEARCHES):
+        found = Layout(searched(seed=seed + 1_000 * number), stays)
+        solved = _solved(task, found, episodes, tell)
+        if solved > most:
+            best, most = found, solved
+        if solved >= _ENOUGH * episodes:
+            break
+    if not most:
+        raise LayoutError(
+            f"the expert of {task} solves none of {episodes} episodes from the places that"
+            f" {_SEARCHES} searches found; try another seed, or a larger clearance"
+        )
+    return best
+
+
+def _solved(task: str, layout: Layout, episodes: int, tell: Callable[[str], None]) -> int:
+    """Return how many episodes the expert of a task solves where its robots stand now."""
+    expert, solved = find_expert(task), 0
+    with closing(make(task, layout=layout, obs_mode="none")) as env:
+        for number, seed in enumerate(range(episodes, 2 * episodes)):
+            tell(f"from the places found, {solved} of {number} episodes solved")
+            try:
+                solved += play(env, seed, expert(env, seed)).solved
+            except TaskError:  # there is no plan
+                pass
+    return solved
 
 
 def _poses(

@@ -23,6 +23,7 @@ BOX, PLINTH = (0.1, 0.07, 0.06), (0.05, 0.11, 0.025)  # half lengths (m)
 AT, FREE = 0.16, 0.17  # of tips from the box's middle that are at it, and that have let go (m)
 HIGH, ON, LEVEL = 0.06, 0.04, radians(8)  # of the box over the table, off the plinth (m), and rad
 PRESSERS = ("west", "east")
+RAISED = (0.0, 0.3, 0.0, -2.0, 0.0, 2.3, pi / 4, 0.04, 0.04)  # rad, m; tips begin over the box
 
 
 @register_task("CellSqueezeBox-v1")
@@ -30,7 +31,8 @@ class CellSqueezeBox(CellTask):
     """Lift the box between two tips, push the plinth beneath it, and set it down on that.
 
     The box stands in the middle, up to 2 cm off along x and 3 cm along y, turned by up to 6°; the
-    plinth lies before the pusher, x in [-0.1, 0.1], y in [-0.4, -0.34] (m), turned by up to 6°.
+    plinth lies before the pusher, x in [-0.1, 0.1], y in [-0.4, -0.34] (m), turned by up to 6°. The
+    tips begin above the box.
 
     Success: the box rests on the plinth, within 4 cm of its middle, level to 8°, and both tips are
     17 cm from its middle.
@@ -43,8 +45,8 @@ class CellSqueezeBox(CellTask):
     )
     layout = Layout(
         {
-            "west": Placement("panda", (-0.7, 0.0, 0.0)),
-            "east": Placement("franka_panda", (0.7, 0.0, 0.0), rpy=(0.0, 0.0, pi)),
+            "west": Placement("panda", (-0.7, 0.0, 0.0), qpos=RAISED),
+            "east": Placement("franka_panda", (0.7, 0.0, 0.0), rpy=(0.0, 0.0, pi), qpos=RAISED),
             "pusher": Placement("ur10", (0.0, -1.1, 0.0), rpy=(0.0, 0.0, pi / 2)),
         }
     )

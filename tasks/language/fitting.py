@@ -8,13 +8,13 @@ lies between them, how it is turned, and by which factor it is larger.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf, pi
+from math import atan2, inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from layouts import Layout
-from layouts.frames import Rectangle
+from layouts.frames import Pose, Rectangle
 from layouts.placement import Placement
 from layouts.shared_place import shared_place, working_factors
 from robot_layouts.simulation.framed import AS_DECLARED, Fit
@@ -29,6 +29,8 @@ _SPLAYED = 0.28  # rad; between jaws that are turned more a body is held by its 
 _LARGEST, _SMALLEST = 3.0, 0.05
 _ASTRAY = 0.02  # m by which arms have to stand better about the origin as it is for it to stay
 _DIGITS = 3  # of places and turns: bases are rounded, too
+_FLAT = 1e-6  # m and sine: so far a frame may lie off the ground, and its z axis off the vertical
+TASK = "task"  # a layout's frame of that name says where the declaration lies
 
 
 def fit_to(
@@ -44,7 +46,8 @@ def fit_to(
     farther than its place needs, or than the one of the task's own that reaches least, unless that
     is more than grippers can hold or than there is room. Its origin lies where it does in
     `layouts.at_task`, or, if it is for two arms or one, where they reach well, as near to that as
-    they do. It stays as declared where arms stand better about that.
+    they do. It stays as declared where arms stand better about that. A layout's frame ``task``
+    says itself where the declaration lies.
 
     Args:
         layout: The robots that are to do the task.
@@ -56,18 +59,21 @@ def fit_to(
         table: Outline of the table, x_min, y_min, x_max, y_max (m).
 
     Raises:
-        TaskError: If no place is in reach of both arms.
+        TaskError: If no place is in reach of both arms, or the frame ``task`` is not level.
         AssetError: If robot files cannot be found.
     """
     arms = [layout.arm(place) for place in declared.places]
     own = [declared.arm(place) for place in declared.places]
-    if all(_alike(*pair) for pair in zip(arms, own, strict=True)):
+    said = layout.frame_poses.get(TASK)
+    if said is None and all(_alike(*pair) for pair in zip(arms, own, strict=True)):
         return AS_DECLARED
     scale, factors = working_factors(layout, declared, declared.places, held, needed)
     if held:
         widest = max(held.values())
         others = [arm.robot for arm, its in zip(arms, own, strict=True) if not _able(arm, its)]
         scale = min([scale, *(_holds(robot) / widest for robot in others if _opening(robot))])
+    if said is not None:
+        return Fit(min(max(scale, _SMALLEST), _LARGEST), *_level(said))
     turn = _turn(own, arms)
     (x, y), room = _origin(own, arms, factors, turn, scale), inf
     moved, as_it_is = (_astray(own, arms, factors, at) for at in (complex(x, y), 0j))
@@ -86,6 +92,21 @@ def fit_to(
         (x, y), room = shared
     scale = min(scale, room / _ROOM)
     return Fit(min(max(scale, _SMALLEST), _LARGEST), x, y, turn)
+
+
+def _level(frame: Pose) -> tuple[float, float, float]:
+    """Return where a frame on the ground lies, x and y (m), and its turn about z (rad).
+
+    Raises:
+        TaskError: If it lies elsewhere, or is tilted.
+    """
+    (x, y, z), (w, i, j, k) = frame.position, frame.quaternion
+    if max(abs(z), abs(i), abs(j)) > _FLAT:
+        raise TaskError(
+            f"the layout's frame {TASK!r} says where the task lies: at z = 0, turned about z alone;"
+            f" it is at z = {z:g} with the orientation {frame.quaternion}"
+        )
+    return x, y, 2 * atan2(k, w)
 
 
 def _turn(own: Sequence[Placement], arms: Sequence[Placement]) -> float:

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from layouts import Layout, single
+from layouts import Frame, Layout, single
 from robot_layouts.__main__ import main
 from robot_layouts.data.elsewhere import SPOTS, _most_different, stand_elsewhere
 from robot_layouts.data.gate import check_task
 from robot_layouts.experts import register_expert
-from robots import TaskError
+from robots import LayoutError, TaskError
 from tasks import MultiRobotTask, register_task
 
 
@@ -35,11 +35,20 @@ class ElsewhereReach(MultiRobotTask):
         return {"success": state.full(False)}
 
 
+class ElsewhereStay(ElsewhereReach):
+    """Be where the arm begins, if it stands where the task has it."""
+
+    def evaluate(self, state):
+        """Success: the hand is before the origin."""
+        return {"success": abs(state.tcp_position("arm")[:, 1]) < 0.05}
+
+
 @pytest.fixture(scope="module", autouse=True)
 def registered():
-    """Make the task known, after other tests have listed all tasks."""
-    task_id = register_task("ElsewhereReach-v1")(ElsewhereReach).task_id
-    register_expert(task_id, lambda task, seed: np.zeros((2, 8), np.float32))
+    """Make the tasks known, after other tests have listed all tasks."""
+    for task in (ElsewhereReach, ElsewhereStay):
+        task_id = register_task(f"{task.__name__}-v1")(task).task_id
+        register_expert(task_id, lambda task, seed: np.zeros((2, 8), np.float32))
 
 
 def test_a_task_that_its_expert_does_not_solve_names_no_places(capsys):
@@ -50,10 +59,19 @@ def test_a_task_that_its_expert_does_not_solve_names_no_places(capsys):
 
 
 @pytest.mark.long
+def test_places_from_which_the_expert_solves_nothing_are_refused():
+    told: list[str] = []
+    with pytest.raises(LayoutError, match="none of 2 episodes from the places that 3 searches"):
+        stand_elsewhere("ElsewhereStay-v1", episodes=2, tries=1, tell=told.append)
+    assert told.count("from the places found, 0 of 1 episodes solved") == 3
+
+
+@pytest.mark.long
 def test_the_expert_solves_the_cell_from_the_places_that_were_found(tmp_path, capsys):
     file = tmp_path / "cell.yaml"
     words = ["tasks", "elsewhere", "CellPutAndClose-v1", "--out", str(file)]
     assert main(words) == 0
     assert f"layout: {file}" in capsys.readouterr().out
+    assert Layout.load(file).frames == {"task": Frame()}  # where it is declared
     found = check_task("CellPutAndClose-v1", 3, layout=Layout.load(file))
     assert [one.check for one in found if not one.passed] == []

@@ -1,12 +1,13 @@
 """Tasks that fit their robots: sizes by reach and gripper, places by what arms share."""
 
-from math import pi
+from dataclasses import astuple
+from math import cos, pi, sin
 
 import numpy as np
 import pytest
 
 import tasks
-from layouts import Layout, Placement, at_task, face_to_face, side_by_side
+from layouts import Frame, Layout, Placement, at_task, face_to_face, side_by_side
 from layouts.shared_place import shared_place
 from robots import TaskError
 from tasks.language.fitting import AS_DECLARED
@@ -128,6 +129,25 @@ def test_what_is_declared_stays_where_all_arms_reach_it_from_other_places():
         for each in (env, own):
             each.reset(seed)
         assert np.array_equal(env.state.pose("cube"), own.state.pose("cube"))
+
+
+def test_a_layout_says_where_the_task_lies():
+    """Its frame is where the declaration is, whoever stands where."""
+    frame = Frame((0.1, -0.05, 0.0), rpy=(0.0, 0.0, 0.5))
+    env = tasks.make("CellPutAndClose-v1", layout=Layout(found_elsewhere(), {"task": frame}))
+    assert astuple(env.task.fit) == pytest.approx((1.0, 0.1, -0.05, 0.5))
+    own = tasks.make("CellPutAndClose-v1")
+    for each in (env, own):
+        each.reset(0)
+    x, y, z = own.state.position("cube")[0].tolist()
+    there = (0.1 + cos(0.5) * x - sin(0.5) * y, sin(0.5) * x + cos(0.5) * y - 0.05, z)
+    assert env.state.position("cube")[0].tolist() == pytest.approx(there, abs=1e-6)
+
+
+@pytest.mark.parametrize("frame", [Frame((0.0, 0.0, 0.3)), Frame(rpy=(0.1, 0.0, 0.0))])
+def test_a_task_lies_on_the_ground(frame):
+    with pytest.raises(TaskError, match="at z = 0, turned about z alone"):
+        tasks.make("CellPutAndClose-v1", layout=Layout(found_elsewhere(), {"task": frame}))
 
 
 def test_the_table_is_also_where_a_task_is_declared_to_work():
