@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from functools import partial
+from math import ceil
 from typing import Annotated, Any
 
 import numpy as np
@@ -44,16 +45,16 @@ def stand_elsewhere(
 
     The expert solves the first episodes where the robots stand. Of each arm the most different
     poses of its TCP, near the lowest, are what it has to reach, or their places if it has fewer
-    than six joints; `layouts.search` does the rest. Then it plays as many more episodes from where
+    than six joints; `layouts.search` does the rest. Then it plays twice as many episodes from where
     they stand now: if it does not solve four of five, another search begins, up to three, and the
     places from which it solves most are returned. The same arguments give the same layout, and
-    `tasks.make` takes it: ``make(task, layout=…)``.
+    `tasks.make` takes it: ``make(task, layout=…)``. Its frame ``task`` keeps the task where it was.
 
     Args:
         task: Its id or another of its names.
         seed: Of the search; another one gives other places.
         episodes: How many episodes the expert plays where the robots stand, from seed 0 on, and
-            then from the places found, from seed ``episodes`` on.
+            then twice as many from the places found, from seed ``episodes`` on.
         clearance: See `layouts.search`; 0.3 m for a task's own robots if not given, and for smaller
             ones as much less as what they do is smaller.
         tries: See `layouts.search`.
@@ -92,32 +93,38 @@ def stand_elsewhere(
         tries=tries,
     )
     stays = {TASK: Frame((fit.x, fit.y, 0.0), rpy=(0.0, 0.0, fit.yaw))}
+    seeds = range(episodes, 3 * episodes)
     best, most = layout, 0
     for number in range(_SEARCHES):
         found = Layout(searched(seed=seed + 1_000 * number), stays)
-        solved = _solved(task, found, episodes, tell)
+        solved = _solved(task, found, seeds, tell)
+        if solved >= ceil(_ENOUGH * len(seeds)):
+            return found
         if solved > most:
             best, most = found, solved
-        if solved >= _ENOUGH * episodes:
-            break
     if not most:
         raise LayoutError(
-            f"the expert of {task} solves none of {episodes} episodes from the places that"
-            f" {_SEARCHES} searches found; try another seed, or a larger clearance"
+            f"the expert of {task} does not begin to solve it from the places that {_SEARCHES}"
+            " searches found; try another seed, or a larger clearance"
         )
     return best
 
 
-def _solved(task: str, layout: Layout, episodes: int, tell: Callable[[str], None]) -> int:
-    """Return how many episodes the expert of a task solves where its robots stand now."""
+def _solved(task: str, layout: Layout, seeds: Sequence[int], tell: Callable[[str], None]) -> int:
+    """Return how many episodes the expert of a task solves where its robots stand now.
+
+    It stops where they can no longer be enough.
+    """
     expert, solved = find_expert(task), 0
     with closing(make(task, layout=layout, obs_mode="none")) as env:
-        for number, seed in enumerate(range(episodes, 2 * episodes)):
+        for number, seed in enumerate(seeds):
             tell(f"from the places found, {solved} of {number} episodes solved")
             try:
                 solved += play(env, seed, expert(env, seed)).solved
             except TaskError:  # there is no plan
                 pass
+            if len(seeds) - (number + 1 - solved) < ceil(_ENOUGH * len(seeds)):
+                break
     return solved
 
 

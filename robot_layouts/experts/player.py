@@ -36,7 +36,9 @@ FIRM = 10  # control steps that they close on after they feel a thing: drives pr
 SLOWS, LACKING, STANDS = 2 * 0.3 * 9.81, 0.3, 3
 ALL_ROUND = tuple(pi / 4 * k for k in range(1, 8))  # rad
 ALIKE = 0.1  # rad: postures whose joints differ less are one
-EXACT, RESTING = 0.01, 0.005  # rad from a pose, and per control step, when a careful arm goes on
+# Rad from a pose, and per control step, when a careful arm goes on; or after so many control steps
+# in which it came no nearer.
+EXACT, RESTING, RESTED = 0.01, 0.005, 10
 AGAIN, WAITING = 4, 100  # control steps after which an arm that waits looks again, and gives up
 
 
@@ -215,10 +217,13 @@ class Player:
         moved, self._before = self._arm(scene) - self._before, self._arm(scene)
         if moves:
             away = np.abs(self._arm(scene) - self._goal).max()
-            near = min(waypoint.near, EXACT) if careful else waypoint.near
-            if self._later or away > near or (careful and np.abs(moved).max() > RESTING):
+            if self._later or away > waypoint.near:
                 self._check_progress(float(away))
                 return False
+            if careful and (away > EXACT or np.abs(moved).max() > RESTING):
+                self._check_progress(float(away))
+                if self._waited < RESTED:
+                    return False
             lacks = waypoint.pushes and self._left(scene) > LACKING * self._stroke
             if lacks and self._waited < STANDS:
                 self._check_progress(float(away))
