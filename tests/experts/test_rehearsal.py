@@ -222,6 +222,19 @@ def test_a_careful_arm_comes_to_rest_before_it_goes_on(careful: bool, farthest: 
     assert farthest / 10 < begun[0] < farthest
 
 
+def test_a_careful_arm_that_is_kept_from_its_pose_goes_on_where_it_is_near_enough():
+    def into_the_table(scene: Scene) -> list[Pose]:
+        (x, y, _), quaternion = scene.tcp("arm")
+        return [(np.array([x, y + 0.15, -0.02]), quaternion)]
+
+    rehearsal = Rehearsal(tasks.make("PickCube-v1"))
+    rehearsal.begin(0)
+    script = {"arm": (Waypoint("press", into_the_table, CLOSED, near=0.2), Waypoint("open", None))}
+    attempt = rehearsal.play(script, careful=True)
+    assert "blocked" not in attempt.reason
+    assert attempt.actions[-1, 7] == OPEN
+
+
 def test_a_waypoint_waits_for_another_robot(two_arms):
     """Without it the left arm opens its fingers at once; with it after 10 steps of the right."""
     two_arms.begin(0)
