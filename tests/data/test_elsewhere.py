@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from layouts import Frame, Layout, single
+from layouts import Layout, Pose, single
 from robot_layouts.__main__ import main
 from robot_layouts.data.elsewhere import SPOTS, _most_different, stand_elsewhere
 from robot_layouts.data.gate import check_task
@@ -72,6 +72,6 @@ def test_the_expert_solves_the_cell_from_the_places_that_were_found(tmp_path, ca
     words = ["tasks", "elsewhere", "CellPutAndClose-v1", "--out", str(file)]
     assert main(words) == 0
     assert f"layout: {file}" in capsys.readouterr().out
-    assert Layout.load(file).frames == {"task": Frame()}  # where it is declared
+    assert Layout.load(file).frame_poses == {"task": Pose()}  # it stays where it is declared
     found = check_task("CellPutAndClose-v1", 3, layout=Layout.load(file))
     assert [one.check for one in found if not one.passed] == []
