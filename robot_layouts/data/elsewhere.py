@@ -28,6 +28,7 @@ _LOW = 0.12  # m above the lowest place of a TCP, that is where its arm works
 _APART = 0.04  # m between poses, at least
 _CLEAR = 0.1  # m that bases keep from the poses
 _SEARCHES, _ENOUGH = 3, 0.8  # at most, until its expert solves that share of episodes from there
+_PATIENCE = 1800.0  # s of each search: of many arms, each with many poses, it takes minutes
 CLEARANCE = 0.3  # m that robots keep from each other, so that they do not work in each other's way
 
 
@@ -91,6 +92,7 @@ def stand_elsewhere(
         reached_by=reached_by,
         clearance=fit.scale * CLEARANCE if clearance is None else clearance,
         tries=tries,
+        patience=_PATIENCE,
     )
     stays = {TASK: Frame((fit.x, fit.y, 0.0), rpy=(0.0, 0.0, fit.yaw))}
     seeds = range(episodes, 3 * episodes)

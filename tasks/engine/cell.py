@@ -12,6 +12,7 @@ from robots.descriptor import Vector3
 from tasks.engine.env import MultiRobotTask
 from tasks.engine.task import Info
 from tasks.language.bodies import Body, Object, WideTable
+from tasks.language.fitting import TASK
 from tasks.language.randomness import EpisodeRandom
 from tasks.language.terms import closeness, inverse, is_at_rest, transform
 
@@ -60,12 +61,18 @@ class CellTask(MultiRobotTask):
     def before(self, arm: str, out: float, aside: float = 0.0) -> tuple[float, float]:
         """Return a place before an arm of a ring, x and y (m, as declared).
 
+        It is before the task's own arm where the layout says where the task lies.
+
         Args:
             arm: The arm.
             out: How far the place is from the origin towards the arm's base (m).
             aside: How far it is from that line, to the right of who looks along it (m).
         """
-        x, y, _ = self.fit.declared(self.layout.arm(arm).base_position)
+        own = type(self).layout
+        if TASK in self.layout.frames and arm in own.places:
+            x, y, _ = own.arm(arm).base_position
+        else:
+            x, y, _ = self.fit.declared(self.layout.arm(arm).base_position)
         x, y = x / hypot(x, y), y / hypot(x, y)
         return out * x + aside * y, out * y - aside * x
 

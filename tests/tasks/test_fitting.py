@@ -1,6 +1,6 @@
 """Tasks that fit their robots: sizes by reach and gripper, places by what arms share."""
 
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from math import cos, pi, sin
 
 import numpy as np
@@ -142,6 +142,20 @@ def test_a_layout_says_where_the_task_lies():
     x, y, z = own.state.position("cube")[0].tolist()
     there = (0.1 + cos(0.5) * x - sin(0.5) * y, sin(0.5) * x + cos(0.5) * y - 0.05, z)
     assert env.state.position("cube")[0].tolist() == pytest.approx(there, abs=1e-6)
+
+
+def test_what_is_laid_before_arms_stays_where_a_layout_says_where_the_task_lies():
+    """It stays before where the task's own arms stand; else it goes along with the arms."""
+    own = tasks.get_task_class("CellHammerPegs-v1").layout
+    base, turn = own["first"].base_pose.position, pi / 6
+    x, y = cos(turn) * base[0] - sin(turn) * base[1], sin(turn) * base[0] + cos(turn) * base[1]
+    moved = {**own, "first": replace(own["first"], position=(x, y, base[2]))}
+    places = []
+    for layout in (own, Layout(moved), Layout(moved, {"task": Frame()})):
+        env = tasks.make("CellHammerPegs-v1", layout=layout, check_layout=False)
+        env.reset(0)
+        places.append(env.state.position("mallet")[0].tolist())
+    assert places[2] == places[0] != places[1]
 
 
 @pytest.mark.parametrize("frame", [Frame((0.0, 0.0, 0.3)), Frame(rpy=(0.1, 0.0, 0.0))])
