@@ -68,9 +68,8 @@ class CellTask(MultiRobotTask):
             out: How far the place is from the origin towards the arm's base (m).
             aside: How far it is from that line, to the right of who looks along it (m).
         """
-        own = type(self).layout
-        if TASK in self.layout.frames and arm in own.places:
-            x, y, _ = own.arm(arm).base_position
+        if TASK in self.layout.frames and arm in type(self).layout.places:
+            x, y, _ = type(self).layout.arm(arm).base_position
         else:
             x, y, _ = self.fit.declared(self.layout.arm(arm).base_position)
         x, y = x / hypot(x, y), y / hypot(x, y)
