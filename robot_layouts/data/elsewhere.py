@@ -46,10 +46,11 @@ def stand_elsewhere(
 
     The expert solves the first episodes where the robots stand. Of each arm the most different
     poses of its TCP, near the lowest, are what it has to reach, or their places if it has fewer
-    than six joints; `layouts.search` does the rest. Then it plays twice as many episodes from where
-    they stand now: if it does not solve four of five, another search begins, up to three, and the
-    places from which it solves most are returned. The same arguments give the same layout, and
-    `tasks.make` takes it: ``make(task, layout=…)``. Its frame ``task`` keeps the task where it was.
+    than six joints; `layouts.search` finds places from which it does, or almost. Then the expert
+    plays twice as many episodes from there: if it does not solve four of five, another search
+    begins, up to three, and the places from which it solves most are returned. The same arguments
+    give the same layout, and `tasks.make` takes it: ``make(task, layout=…)``. Its frame ``task``
+    keeps the task where it was.
 
     Args:
         task: Its id or another of its names.
@@ -65,7 +66,8 @@ def stand_elsewhere(
     Raises:
         UnknownNameError: If the task, a place or a robot is unknown.
         TaskError: If the task cannot be made like that, has no expert, or it solves no episode.
-        LayoutError: If no other places are found, or it solves no episode from them.
+        LayoutError: If no other places are found that are clear of each other, or it solves no
+            episode from them.
         MissingPackageError: If python-fcl or scipy is not installed.
     """
     with closing(make(task, obs_mode="none", **making)) as env:
@@ -92,6 +94,7 @@ def stand_elsewhere(
         reached_by=reached_by,
         clearance=fit.scale * CLEARANCE if clearance is None else clearance,
         tries=tries,
+        partial=True,  # the expert says whether they do
         patience=_PATIENCE,
     )
     stays = {TASK: Frame((fit.x, fit.y, 0.0), rpy=(0.0, 0.0, fit.yaw))}
