@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import tasks
+from layouts import Frame, Layout
 from robot_layouts.__main__ import main
 from robot_layouts.data.playing.mode_conversion import as_positions
 from robot_layouts.data.playing.replay import find_official, open_recording, replay
 from robot_layouts.data.reading.json_files import TrajectoryError
-from robot_layouts.data.reading.recorded_task import task_for
+from robot_layouts.data.reading.provenance import describe_layout
+from robot_layouts.data.reading.recorded_task import layout_again, same_places, task_for
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recording.recorder import Recorder
 from tasks.episode import play
@@ -155,6 +157,16 @@ def test_a_robot_that_stood_elsewhere_stands_there_again(capsys, path):
     code, printed, _ = run(capsys, path)
     assert code == 1
     assert "differ at the start in panda_stick" in printed
+
+
+def test_the_layout_of_a_recording_says_where_the_task_lay():
+    own = tasks.get_task_class("CellPutAndClose-v1").layout
+    moved = Layout(own, {"task": Frame((0.05, 0.0, 0.0), rpy=(0.0, 0.0, 0.1))})
+    again = layout_again(describe_layout(moved), {}, own, {}, "a file")
+    assert again.frame_poses == moved.frame_poses
+    assert same_places(again, moved)
+    assert not same_places(again, own)
+    assert layout_again(describe_layout(own), {}, own, {}, "a file").frames == {}
 
 
 @pytest.mark.parametrize(

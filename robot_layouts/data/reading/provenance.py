@@ -50,6 +50,7 @@ from robots.urdf.cleaning.cleaning import is_template
 from robots.urdf.summary import MAX_URDF_BYTES, asset_fingerprint
 from tasks import Scenario, TaskEnv
 from tasks.engine.cameras import CameraData, describe_cameras
+from tasks.language.fitting import TASK
 from tasks.native.format import observation_keys
 from tasks.registry import full_name
 
@@ -99,6 +100,7 @@ class _PlaceJson(TypedDict):
     start_qpos: NotRequired[list[Finite]]
     joint_groups: NotRequired[Object]
     assets: NotRequired[AnyText]
+    task: NotRequired[Annotated[list[Finite], length(7)]]
 
 
 class _Simulation(TypedDict, total=False):
@@ -124,13 +126,15 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
     Each has ``robot``, base ``position`` (m) and ``quaternion`` (wxyz), ``keyframe`` (None if it
     starts from positions of its own), ``start_qpos`` (rad, m), ``qpos_noise`` (rad), ``action``
     (its first and last + 1 action number), ``joint_groups`` (see `robots.JointGroup`), and
-    ``assets``, a SHA-256 over its files. Everything can be written as json; the order is that of
-    the action numbers.
+    ``assets``, a SHA-256 over its files. Where the layout says where the task lies, each has that
+    as ``task``, too: place (m) and orientation (wxyz). Everything can be written as json; the order
+    is that of the action numbers.
 
     Raises:
         AssetError: If robot files cannot be found.
     """
-    split = layout.robot_actions
+    split, frame = layout.robot_actions, layout.frame_poses.get(TASK)
+    lies = {} if frame is None else {"task": [*frame.position, *frame.quaternion]}
     return {
         name: {
             "robot": placement.robot.name,
@@ -145,6 +149,7 @@ def describe_layout(layout: Layout) -> dict[str, dict[str, Any]]:
                 for group, joints in placement.robot.action_split.groups.items()
             },
             "assets": asset_fingerprint(placement.robot.urdf),
+            **lies,
         }
         for name, placement in layout.items()
     }

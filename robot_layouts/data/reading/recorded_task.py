@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from layouts import Layout, Placement
+from layouts import Frame, Layout, Placement
 from layouts.placement import RobotLike
 from robot_layouts.data.reading.json_files import TrajectoryError
 from robot_layouts.data.reading.provenance import guess_again
@@ -13,6 +13,7 @@ from robot_layouts.data.reading.recording import Recording
 from robots import LayoutError, RobotLayoutsError, RobotRegistry, UnknownNameError
 from tasks import MultiRobotTask, TaskEnv, get_task_class, make
 from tasks.engine.cameras import cameras_again
+from tasks.language.fitting import TASK
 from tasks.language.needs import ACT, HOLD
 from tasks.native.format import mode_by_arm
 from tasks.randomization.declaration import Randomization
@@ -198,13 +199,17 @@ def layout_again(
                 f" robots={{{place!r}: …}}"
             ) from error
     try:
-        return Layout(placements)
+        lies = next((about["task"] for about in described.values() if "task" in about), None)
+        frames = {} if lies is None else {TASK: Frame(tuple(lies[:3]), tuple(lies[3:]))}
+        return Layout(placements, frames)
     except LayoutError as error:
         raise TrajectoryError(f"{source} has no layout that can be used: {error}") from error
 
 
 def same_places(first: Layout, second: Layout) -> bool:
-    """Return whether two layouts put the same robots at the same places of the world."""
+    """Return whether two layouts put the same robots and the task at the same places."""
+    if first.frame_poses.get(TASK) != second.frame_poses.get(TASK):
+        return False
     return [_outline(*item) for item in first.items()] == [
         _outline(*item) for item in second.items()
     ]
