@@ -1,8 +1,9 @@
 """``python -m benchmarks cells``: what the experts of cells solve with other robots than their own.
 
 All roles that admit a robot are filled with it; those that need fingers keep their own robot where
-it has none. Cells are also played by two makes in turn, drawn by the cell's name, some by mixtures
-that were chosen, and some by their own robots in places that a search found.
+it has none. Every two of twelve makes also play cells that are drawn for them, in which they take
+the roles in turn; some are played by mixtures that were chosen, and some by their own robots in
+places that a search found.
 """
 
 from __future__ import annotations
@@ -36,7 +37,10 @@ from tasks import Needs, get_task_class, list_tasks, make
 from tasks.episode import play
 
 ROBOTS = ("so101", "xarm7", "xarm7_with_panda", "z1", "fetch", "ur10")
-PAIRED = ("so101", "xarm7", "panda", "z1", "ur5", "ur10")  # of which two makes are drawn
+PAIRED = (
+    *("koch", "so100", "so101", "ur3", "xarm7", "panda"),
+    *("panda_stick", "z1", "ur5", "jaco2", "fetch", "ur10"),
+)  # by reach; every two of these take the roles of some cells in turn
 PATIENCE = 150  # s that an expert may plan an episode
 MIXED = (
     ("CellPressTogether-v1", ("ur10", "panda", "xarm7")),
@@ -68,7 +72,7 @@ def cells(
             mixtures.
         tasks: Which cells; all of those that fit their robots if not given.
         seeds: How many episodes of each; those in the record are not played again.
-        pairs: Of how many pairs of makes each cell is also played, which take its roles in turn.
+        pairs: How many cells each pair of makes plays, taking their roles in turn.
         elsewhere: In how many layouts of a search each cell is also played by its own robots.
         out: The record, written after every episode; the page is beside it.
 
@@ -131,13 +135,10 @@ def _cases(
     for robot, task in product(robots, tasks):
         if roles := _roles(task, robot):
             yield task, robot, dict.fromkeys(roles, robot), "cells"
-    for task in tasks:
-        drawn = Random(task).sample([*permutations(PAIRED, 2)], pairs)
-        for two in drawn:
-            turns = zip(get_task_class(task).layout, cycle(two))
-            named = {role: robot for role, robot in turns if role in _roles(task, robot)}
-            if {*named.values()} == {*two}:
-                yield task, ", ".join(two), named, "pairs"
+    for two in permutations(PAIRED, 2) if pairs else ():
+        label, admit = ", ".join(two), [task for task in tasks if _all_roles(task, *two)]
+        for task in Random(label).sample(admit, pairs):
+            yield task, label, dict(zip(get_task_class(task).layout, cycle(two))), "pairs"
     for task, named in MIXED:
         if task in tasks:
             yield (
@@ -155,6 +156,11 @@ def _roles(task: str, robot: str) -> list[str]:
     cls, fingers = get_task_class(task), robot_of(robot).fingers is not None
     anyone = cls.needs.get("*", Needs())
     return [role for role in cls.layout if fingers or not cls.needs.get(role, anyone).fingers]
+
+
+def _all_roles(task: str, *robots: str) -> bool:
+    """Return whether each of these robots can fill any place of a task."""
+    return all(len(_roles(task, robot)) == len(get_task_class(task).layout) for robot in robots)
 
 
 def _making(task: str, label: str, robots: Mapping[str, str]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ HELD = 0.085  # m; height of the tips when they press: hands stay above the box
 LEGS, RAISED = 5, HIGH + 0.04  # in how many steps it is lifted, and how far (m)
 OVER_PLINTH = {"down 0": 0.5}  # how far of its way over the plinth the box goes; then all of it
 TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))  # how deep tips press (m), and strokes of the push
+FLANGE = 0.047  # m; so far outside stays the middle of one that is as wide as an xArm 7's
 
 
 def squeeze_box(task: TaskEnv, seed: int) -> Plan:
@@ -33,12 +34,19 @@ def squeeze_box(task: TaskEnv, seed: int) -> Plan:
     return first_success(
         task,
         seed,
-        lambda scene: [_script(task, *tried) for tried in TRIED],
+        lambda scene: [_script(task, *tried, wide) for wide in _widths(task) for tried in TRIED],
         as_declared=True,
     )
 
 
-def _script(task: TaskEnv, deep: float, strokes: int) -> Script:
+def _widths(task: TaskEnv) -> list[float]:
+    """Return how far outside the middle of a tip without fingers may have to stay (m)."""
+    return (
+        [0.0, FLANGE] if any(task.layout.arm(arm).robot.fingers is None for arm in SIDES) else [0.0]
+    )
+
+
+def _script(task: TaskEnv, deep: float, strokes: int, wide: float) -> Script:
     start: list[Floats] = []  # where the box stood
 
     def under(scene: Scene) -> Floats:
@@ -49,11 +57,14 @@ def _script(task: TaskEnv, deep: float, strokes: int) -> Script:
     )
     return {
         "pusher": (*pushing, stand_back(task, "pusher")),
-        **{arm: _pressing(task, arm, deep, start) for arm in SIDES},
+        **{arm: _pressing(task, arm, deep, wide, start) for arm in SIDES},
     }
 
 
-def _pressing(task: TaskEnv, arm: str, deep: float, start: list[Floats]) -> tuple[Waypoint, ...]:
+def _pressing(
+    task: TaskEnv, arm: str, deep: float, wide: float, start: list[Floats]
+) -> tuple[Waypoint, ...]:
+    out = (wide if task.layout.arm(arm).robot.fingers is None else 0.0) - deep
     (other,) = (each for each in SIDES if each != arm)
     go = partial(reaching, task, arm, leans=(0.0,), as_it_is=False, gripper=CLOSED)
 
@@ -65,7 +76,7 @@ def _pressing(task: TaskEnv, arm: str, deep: float, start: list[Floats]) -> tupl
 
     def step(name: str, up: float, before: str) -> Waypoint:
         over = OVER_PLINTH.get(name, float(name.startswith("down")))
-        place = partial(beside, out=-deep, up=up, over=over)
+        place = partial(beside, out=out, up=up, over=over)
         after = (f"{other}.{before}", *(("pusher.away plinth",) if name == "down 0" else ()))
         return go(name, place, near=pi, steps=6, after=after)
 

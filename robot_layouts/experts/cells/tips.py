@@ -17,6 +17,7 @@ Place = Callable[[Scene], Floats]
 """A place, (3,) (m, world), given the scene."""
 
 PUSHING = (0.0, 0.3, 0.6, -0.3)  # how far grippers lean from straight down (rad)
+FAR = (0.9, 1.2)  # these where those are out of reach
 PRESSING = (0.0, 0.3, -0.3, 0.6)
 UPRIGHT, SLANTED = (0.0, 0.15, -0.15), (0.3, 0.6, 0.9, 1.2)  # these where those are out of reach
 HIGH, OVER = 0.14, 0.06  # of tips on their way over the table, and over what they press (m)
@@ -50,7 +51,8 @@ def push(
         height: Of the tip over the table (m).
         after: Waypoints of other arms that come before.
     """
-    go = partial(reaching, task, robot, leans=PUSHING, as_it_is=False, gripper=CLOSED)
+    lean = {"leans": PUSHING, "farther": FAR}
+    go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
     line: list[Floats] = []  # where it aims
 
     def aim(scene: Scene) -> tuple[Floats, Floats]:
