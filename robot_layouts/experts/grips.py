@@ -73,7 +73,7 @@ def role_grip(task: TaskEnv, robot: str) -> Grip | None:
     needs = task.task.needs
     held = needs.get(robot, needs.get("*", Needs())).opening
     owner, arm = task.layout.owner(robot), task.layout.arm(robot).robot
-    if held is None or not _may_swing(arm):
+    if held is None or not may_swing(arm):
         return None
     limb, whole = task.layout.arm_name(robot).removeprefix(owner), task.layout[owner].robot
     width, simulator = round(held * task.task.fit.scale, 6), task.scenario.simulator
@@ -87,7 +87,8 @@ def role_grip(task: TaskEnv, robot: str) -> Grip | None:
 
 
 @lru_cache(maxsize=64)
-def _may_swing(robot: RobotDescriptor) -> bool:
+def may_swing(robot: RobotDescriptor) -> bool:
+    """Return whether a robot has a driven gripper whose pads turn against each other."""
     try:
         motion = gripper_motion(robot)
     except DescriptorError:

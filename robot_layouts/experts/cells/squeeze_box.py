@@ -19,6 +19,7 @@ from tasks.cells.squeeze_box import BOX, HIGH, PLINTH
 SIDES = {"west": -1.0, "east": 1.0}
 GAP, OVER = 0.09, 0.1  # of tips before the box's sides, and higher than where they press (m)
 HELD = 0.085  # m; height of the tips when they press: hands stay above the box
+LEANS = (0.15, 0.3, 0.45, 0.6)  # of tips that do not reach there upright (rad)
 LEGS, RAISED = 5, HIGH + 0.04  # in how many steps it is lifted, and how far (m)
 OVER_PLINTH = {"down 0": 0.5}  # how far of its way over the plinth the box goes; then all of it
 TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))  # how deep tips press (m), and strokes of the push
@@ -66,7 +67,8 @@ def _pressing(
 ) -> tuple[Waypoint, ...]:
     out = (wide if task.layout.arm(arm).robot.fingers is None else 0.0) - deep
     (other,) = (each for each in SIDES if each != arm)
-    go = partial(reaching, task, arm, leans=(0.0,), as_it_is=False, gripper=CLOSED)
+    lean = {"leans": (0.0,), "farther": LEANS}
+    go = partial(reaching, task, arm, **lean, as_it_is=False, gripper=CLOSED)
 
     def beside(scene: Scene, out: float, up: float, over: float = 0.0) -> Floats:
         """Return a place beside the box, where it stood or that far on its way over the plinth."""

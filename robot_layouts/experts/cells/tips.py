@@ -8,6 +8,7 @@ from math import pi
 
 import numpy as np
 
+from robot_layouts.experts.grips import may_swing
 from robot_layouts.experts.reaching import reaching
 from robot_layouts.experts.script import CLOSED, Scene, Waypoint
 from robot_layouts.kinematics.rotations import Floats
@@ -39,7 +40,9 @@ def push(
 ) -> tuple[Waypoint, ...]:
     """Return the waypoints with which a tip pushes a block to a place, aiming at every stroke.
 
-    They are ``above``, ``behind``, ``push 0`` …, ``back`` and ``away``, with the block's name.
+    They are ``above``, ``behind``, ``push 0`` …, ``back`` and ``away``, with the block's name. What
+    a flat tip pushes moves as the tip does, which goes the way that the block has to; round ones
+    slip, and get behind the block anew.
 
     Args:
         task: Says where the arm stands.
@@ -53,6 +56,8 @@ def push(
     """
     lean = {"leans": PUSHING, "farther": FAR}
     go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
+    arm = task.layout.arm(robot).robot
+    flat = arm.fingers is not None and not may_swing(arm)
     line: list[Floats] = []  # where it aims
 
     def aim(scene: Scene) -> tuple[Floats, Floats]:
@@ -70,7 +75,8 @@ def push(
         target, away = aim(scene)
         tip, block = scene.tcp(robot)[0][:2], scene.body(body)[0][:2]
         far, rest = float((tip - target) @ away), float((block - target) @ away) - BEYOND
-        return np.array([*(target + (far - max(rest / left, min(LEAST, rest))) * away), height])
+        start = tip if flat else target + far * away
+        return np.array([*(start - max(rest / left, min(LEAST, rest)) * away), height])
 
     def back(scene: Scene, up: float) -> Floats:
         return np.array([*(scene.tcp(robot)[0][:2] + 0.06 * aim(scene)[1]), up])
@@ -200,7 +206,8 @@ def press_down(
         depth: How far the tip goes below that (m).
         after: Waypoints of other arms that come before it is pressed.
     """
-    go = partial(reaching, task, robot, leans=PRESSING, as_it_is=False, gripper=CLOSED)
+    lean = {"leans": PRESSING, "farther": FAR}
+    go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
 
     def at(scene: Scene, up: float) -> Floats:
         return top(scene) + np.array([0.0, 0.0, up])
