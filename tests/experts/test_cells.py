@@ -8,6 +8,7 @@ from robot_layouts.data.gate import check_task
 from robot_layouts.experts import find_expert
 from tasks.episode import play
 
+UR5_AND_Z1 = {"south": "ur5", "east": "z1", "north": "ur5", "west": "z1"}
 CELLS = [name for name in tasks.list_tasks() if name.startswith("Cell")]
 
 
@@ -30,3 +31,16 @@ def test_rings_may_have_another_number_of_arms(task_id):
 def test_a_hand_comes_down_on_a_bracket_as_it_has_set_off():
     env = tasks.make("CellHangBrackets-v1")  # of seed 49 the third hand turned about on its way
     assert play(env, 49, find_expert("CellHangBrackets-v1")(env, 49)).solved
+
+
+@pytest.mark.parametrize(
+    ("task_id", "robots", "seed"),
+    [
+        ("CellTwoHandPress-v1", {"loader": "panda"}, 1),  # a flat tip, to which the block sticks
+        pytest.param("CellGatherBlocks-v1", UR5_AND_Z1, 0, marks=pytest.mark.long),  # z1s lean far
+        pytest.param("CellSqueezeBox-v1", "xarm7", 0, marks=pytest.mark.long),  # is wide
+    ],
+)
+def test_tips_of_other_makes_push_and_press(task_id, robots, seed):
+    env = tasks.make(task_id, robots=robots)
+    assert play(env, seed, find_expert(task_id)(env, seed)).solved
