@@ -37,10 +37,8 @@ from tasks import Needs, get_task_class, list_tasks, make
 from tasks.episode import play
 
 ROBOTS = ("so101", "xarm7", "xarm7_with_panda", "z1", "fetch", "ur10")
-PAIRED = (
-    *("koch", "so100", "so101", "ur3", "xarm7", "panda"),
-    *("panda_stick", "z1", "ur5", "jaco2", "fetch", "ur10"),
-)  # by reach; every two of these take the roles of some cells in turn
+# Every two of these, by reach, take the roles of some cells in turn.
+PAIRED = "koch so100 so101 ur3 xarm7 panda panda_stick z1 ur5 jaco2 fetch ur10".split()
 PATIENCE = 150  # s that an expert may plan an episode
 MIXED = (
     ("CellPressTogether-v1", ("ur10", "panda", "xarm7")),
@@ -137,7 +135,7 @@ def _cases(
             yield task, robot, dict.fromkeys(roles, robot), "cells"
     for two in permutations(PAIRED, 2) if pairs else ():
         label, admit = ", ".join(two), [task for task in tasks if _all_roles(task, *two)]
-        for task in Random(label).sample(admit, pairs):
+        for task in Random(label).sample(admit, min(pairs, len(admit))):
             yield task, label, dict(zip(get_task_class(task).layout, cycle(two))), "pairs"
     for task, named in MIXED:
         if task in tasks:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
@@ -86,14 +87,18 @@ def role_grip(task: TaskEnv, robot: str) -> Grip | None:
     return next((grip for grip in grips if grip is not None), None)
 
 
-@lru_cache(maxsize=64)
 def may_swing(robot: RobotDescriptor) -> bool:
     """Return whether a robot has a driven gripper whose pads turn against each other."""
-    try:
-        motion = gripper_motion(robot)
-    except DescriptorError:
-        return False
-    return bool(motion.angles.max() >= PARALLEL)
+    motion = driven_gripper(robot)
+    return motion is not None and bool(motion.angles.max() >= PARALLEL)
+
+
+@lru_cache(maxsize=64)
+def driven_gripper(robot: RobotDescriptor) -> GripperMotion | None:
+    """Return how the gripper of a robot moves; None without one that is driven."""
+    with suppress(DescriptorError):
+        return gripper_motion(robot)
+    return None
 
 
 @lru_cache(maxsize=64)

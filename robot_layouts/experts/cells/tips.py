@@ -8,7 +8,7 @@ from math import pi
 
 import numpy as np
 
-from robot_layouts.experts.grips import may_swing
+from robot_layouts.experts.grips import driven_gripper, may_swing
 from robot_layouts.experts.reaching import reaching
 from robot_layouts.experts.script import CLOSED, Scene, Waypoint
 from robot_layouts.kinematics.rotations import Floats
@@ -22,6 +22,7 @@ FAR = (0.9, 1.2)  # these where those are out of reach
 PRESSING = (0.0, 0.3, -0.3, 0.6)
 UPRIGHT, SLANTED = (0.0, 0.15, -0.15), (0.3, 0.6, 0.9, 1.2)  # these where those are out of reach
 HIGH, OVER = 0.14, 0.06  # of tips on their way over the table, and over what they press (m)
+OFF = 0.005  # m; of fingers that push over the table, as they are, not as declared
 LEAST = 0.012  # m; of a stroke, unless less is left
 PRESSED = 8  # control steps that pressing takes, however far the tip comes
 BEYOND = 0.15  # m behind its end, where a push aims; so it stays steady near the end
@@ -51,13 +52,15 @@ def push(
         end: Where it is to lie; its height does not count.
         gap: Between the tip and the block's middle when the tip comes down (m).
         strokes: In how many parts it is pushed.
-        height: Of the tip over the table (m).
+        height: Of the TCP over the table (m), or more where fingers reach farther down.
         after: Waypoints of other arms that come before.
     """
     lean = {"leans": PUSHING, "farther": FAR}
     go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
     arm = task.layout.arm(robot).robot
-    flat = arm.fingers is not None and not may_swing(arm)
+    hand = driven_gripper(arm)
+    flat = hand is not None and not may_swing(arm)
+    low = max(height, (hand.beyond + OFF) / task.task.fit.scale if hand is not None else 0.0)
     line: list[Floats] = []  # where it aims
 
     def aim(scene: Scene) -> tuple[Floats, Floats]:
@@ -76,19 +79,19 @@ def push(
         tip, block = scene.tcp(robot)[0][:2], scene.body(body)[0][:2]
         far, rest = float((tip - target) @ away), float((block - target) @ away) - BEYOND
         start = tip if flat else target + far * away
-        return np.array([*(start - max(rest / left, min(LEAST, rest)) * away), height])
+        return np.array([*(start - max(rest / left, min(LEAST, rest)) * away), low])
 
     def back(scene: Scene, up: float) -> Floats:
         return np.array([*(scene.tcp(robot)[0][:2] + 0.06 * aim(scene)[1]), up])
 
     return (
         go(f"above {body}", partial(behind, up=HIGH), near=0.05, after=tuple(after)),
-        go(f"behind {body}", partial(behind, up=height), near=0.03),
+        go(f"behind {body}", partial(behind, up=low), near=0.03),
         *(
             go(f"push {body} {i}", partial(along, left=strokes - i), near=0.03, pushes=True)
             for i in range(strokes)
         ),
-        go(f"back {body}", partial(back, up=height), near=0.1),
+        go(f"back {body}", partial(back, up=low), near=0.1),
         go(f"away {body}", partial(back, up=HIGH), near=0.1),
     )
 
