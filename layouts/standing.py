@@ -49,7 +49,8 @@ def at_task(
     towards it and at the same height: as much nearer as it reaches less than that one of the task's
     own which reaches least, and farther only as far as all robots reach farther. What a robot
     holds it has to reach with its gripper down. It is raised, if its wheels or feet are lower than
-    its base.
+    its base. Robots that would collide as they start begin with their hands drawn back, and stand
+    farther from the middle if that is not enough, where their files are at hand.
 
     One robot of several limbs serves several places at once: its limbs are called like them, the
     left one serving the first unless they are called so already, and its shoulders are above the
@@ -108,9 +109,9 @@ def at_task(
             moved[place] = _moved(layout, place, robot, middle, factor * others)
         return Layout(moved, layout.frames)
 
-    if not any(map(lt, factors, by_reach)):  # else they stand nearer to each other than is usual
-        return placed(1.0)
-    arms = [place for place in loaded if place in holding and not loaded[place].limbs]
+    holds = any(map(lt, factors, by_reach))  # then they stand nearer to each other than is usual
+    drawn = [place for place in loaded if place in holding] if holds else [*loaded]
+    arms = [place for place in drawn if not loaded[place].limbs]
     return _apart(placed, arms, middle)
 
 

@@ -56,6 +56,13 @@ def test_other_robots_stand_where_they_reach_as_far(robots):
     assert tasks.make(TASK, robots=robots).layout == at_task(robots, task)
 
 
+def test_robots_that_would_collide_as_they_start_draw_back_or_stand_apart():
+    cell = tasks.get_task_class("CellUnlock-v1")  # two Fetches on either side of a Panda
+    robots = {"holder": "fetch", "thrower": "panda", "presser": "fetch"}
+    report = at_task(robots, cell).validate(workspaces=False)
+    assert [finding for finding in report.findings if finding.kind == "collision"] == []
+
+
 def test_a_task_is_as_small_as_the_place_asks_whose_robot_reaches_too_little():
     """The Panda pushes the block where the UR10 of the cell needs 1.1 m."""
     env = tasks.make("CellRelay-v1", robots={"second": "panda"})
