@@ -80,11 +80,11 @@ def at_task(
     layout = task if isinstance(task, Layout) else getattr(task, "layout", None)
     if not isinstance(layout, Layout):
         raise LayoutError(f"task is {shown(task)}; a task, its class or a Layout is needed")
+    table = getattr(task, "table", None)
+    outline = table.outline(layout) if table is not None else None
     if not isinstance(robots, Mapping):
         robot = load_robot(robots)
         if robot.limbs:
-            table = getattr(task, "table", None)
-            outline = table.outline(layout) if table is not None else None
             return Layout({NAME: _body(robot, layout, outline)}, layout.frames)
         robots = dict.fromkeys(layout, robot)
     from layouts.shared_place import working_factors
@@ -112,16 +112,19 @@ def at_task(
     holds = any(map(lt, factors, by_reach))  # then they stand nearer to each other than is usual
     drawn = [place for place in loaded if place in holding] if holds else [*loaded]
     arms = [place for place in drawn if not loaded[place].limbs]
-    return _apart(placed, arms, middle)
+    return _apart(placed, arms, middle, outline)
 
 
-def _apart(placed: Callable[[float], Layout], arms: Sequence[str], middle: Point) -> Layout:
+def _apart(
+    placed: Callable[[float], Layout], arms: Sequence[str], middle: Point, table: Rectangle | None
+) -> Layout:
     """Return a layout whose robots do not collide as they start; the nearest one if none is found.
 
     Args:
         placed: Makes one, with robots farther from the middle by a factor.
         arms: Those that are drawn back before all stand farther apart.
         middle: Of what they work on, x and y (m).
+        table: Outline of the task's own table, which they are not to touch either.
     """
     from layouts.ready import drawn_back
 
@@ -132,8 +135,8 @@ def _apart(placed: Callable[[float], Layout], arms: Sequence[str], middle: Point
             if back:
                 ready = {place: drawn_back(layout[place], middle) for place in arms}
                 layout = Layout({**layout, **ready}, layout.frames)
-            report = layout.validate(workspaces=False, samples=NOISES)
-            found = [finding for finding in report.findings if finding.kind == "collision"]
+            report = layout.validate(workspaces=False, samples=NOISES, table=table)
+            found = [finding for finding in report.findings if finding.kind in ("collision", "table")]
             if not found:
                 return layout
             share *= max(_factor(layout, finding) for finding in found) if back else 1.0

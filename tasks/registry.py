@@ -402,22 +402,23 @@ class UnexpectedArgumentError(UnknownNameError, TypeError):
 def _replace_robots(
     cls: type[MultiRobotTask], layout: Layout, robots: RobotLike | Mapping[str, RobotLike]
 ) -> Layout:
+    where = cls if layout == cls.layout else layout
     if isinstance(robots, Mapping):
         if cls.robot_counts is None:
             _refuse_bodies(cls, robots)
         if cls.fits() and robots:
             held, needed = held_widths(cls, layout), needed_reaches(cls, layout)
-            return at_task(robots, layout, holding=held, needed=needed)
+            return at_task(robots, where, holding=held, needed=needed)
         changed = {place: _stand(layout[place], robot) for place, robot in robots.items()}
         lost = {place: at.robot for place, at in changed.items() if _lacks_a_place(at)}
         if lost:
             held, needed = held_widths(cls, layout), needed_reaches(cls, layout)
-            placed = at_task(lost, layout, holding=held, needed=needed)
+            placed = at_task(lost, where, holding=held, needed=needed)
             changed |= {place: placed[place] for place in lost}
         return Layout({**layout, **changed}, layout.frames)
     if isinstance(robots, (str, PathLike, RobotDescriptor)):
         if (robot := load_robot(robots)).limbs:
-            return at_task(robot, cls if layout == cls.layout else layout)
+            return at_task(robot, where)
         return _replace_robots(cls, layout, dict.fromkeys(layout, robot))
     names = [name for name in robots if isinstance(name, str)] if isinstance(robots, list) else []
     example = dict(zip(layout, names or ["panda"], strict=False))
