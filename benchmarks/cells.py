@@ -38,7 +38,8 @@ from tasks.episode import play
 
 ROBOTS = ("so101", "xarm7", "xarm7_with_panda", "z1", "fetch", "ur10")
 # Every two of these, by reach, take the roles of some cells in turn.
-PAIRED = "koch so100 so101 ur3 xarm7 panda panda_stick z1 ur5 jaco2 fetch ur10".split()
+PAIRED = "koch so100 so101 ur3 xarm7 xarm7_with_panda panda panda_stick z1 ur5 fetch ur10".split()
+LONGER = 2  # than with their own robots are episodes; small arms are slow in their control modes
 PATIENCE = 150  # s that an expert may plan an episode
 MIXED = (
     ("CellPressTogether-v1", ("ur10", "panda", "xarm7")),
@@ -164,7 +165,8 @@ def _all_roles(task: str, *robots: str) -> bool:
 def _making(task: str, label: str, robots: Mapping[str, str]) -> dict[str, Any]:
     """Return the robots of a case, or where its own stand."""
     if robots:
-        return {"robots": {role: robot_of(name) for role, name in robots.items()}}
+        named = {role: robot_of(name) for role, name in robots.items()}
+        return {"robots": named, "max_episode_steps": LONGER * get_task_class(task).max_episode_steps}
     return {"layout": stand_elsewhere(task, seed=int(label.split()[1]))}
 
 

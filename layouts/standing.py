@@ -145,7 +145,12 @@ def _apart(
 
 
 def _factor(layout: Layout, finding: Finding) -> float:
-    """Return by which factor two robots have to stand farther apart so that they do not collide."""
+    """Return by which factor two robots have to stand farther apart so that they do not collide.
+
+    It is more than any where that does not help: one robot touches itself, or the table.
+    """
+    if len(finding.robots) == 1:
+        return FARTHEST
     (x, y, _), (u, v, _) = (layout[robot].base_position for robot in finding.robots)
     apart = math.hypot(x - u, y - v)
     return FARTHEST if finding.farther is None or not apart else 1 + finding.farther / apart

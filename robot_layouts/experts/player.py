@@ -361,11 +361,17 @@ class Player:
         """Return arm joints that bring the TCP to a place.
 
         They are sought from the present ones, and from those turned towards the place by the
-        first joint, which turns an arm about its base.
+        first joint, which turns an arm about its base. Where those lead nowhere, as they may from
+        limits of joints, they are sought from the middle of what the others can do.
         """
         arm, tip = self._reach.arm(scene.qpos(self._robot)), scene.tcp(self._robot)[0]
         point = self._in_link(scene, arm)
         about = remainder(heading(self._base, place) - heading(self._base, tip), 2 * pi)
         starts = [arm + about * side * (np.arange(len(arm)) == 0) for side in (0, 1, -1)]
         goals = [self._reach.solve(point, place, start) for start in starts]
-        return [goal for goal in goals if goal is not None]
+        found = [goal for goal in goals if goal is not None]
+        if found:
+            return found
+        start = np.array([starts[1][0], *self._reach.middle[1:]])
+        goal = self._reach.solve(point, place, start)
+        return [] if goal is None else [goal]

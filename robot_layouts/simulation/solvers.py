@@ -14,6 +14,7 @@ model and a follower of its own, since clones and published episodes owe their l
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import pi
 from typing import Any, Protocol
 
 import numpy as np
@@ -149,11 +150,13 @@ class PointReach:
 
     Attributes:
         joints: The arm's joints, in the order of the solutions.
+        middle: Of the range of each, or of what is within ±π of it (rad).
     """
 
     def __init__(self, arm: ArmModel) -> None:
         """Take an arm."""
         self._model, self.joints = arm, arm.joints
+        self.middle = np.clip([arm.low, arm.high], -pi, pi).mean(axis=0)
 
     def arm(self, qpos: Floats) -> Floats:
         """Pick the arm's joints out of all in the descriptor's order."""

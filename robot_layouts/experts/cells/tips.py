@@ -58,9 +58,8 @@ def push(
     lean = {"leans": PUSHING, "farther": FAR}
     go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
     arm = task.layout.arm(robot).robot
-    hand = driven_gripper(arm)
-    flat = hand is not None and not may_swing(arm)
-    low = max(height, (hand.beyond + OFF) / task.task.fit.scale if hand is not None else 0.0)
+    flat = driven_gripper(arm) is not None and not may_swing(arm)
+    low = max(height, _below_tcp(task, robot, OFF))
     line: list[Floats] = []  # where it aims
 
     def aim(scene: Scene) -> tuple[Floats, Floats]:
@@ -206,17 +205,24 @@ def press_down(
         robot: The arm; its fingers stay closed, if it has some.
         body: What is pressed.
         top: Where.
-        depth: How far the tip goes below that (m).
+        depth: How far the tip, or the end of fingers, goes below that (m).
         after: Waypoints of other arms that come before it is pressed.
     """
     lean = {"leans": PRESSING, "farther": FAR}
     go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
+    low = _below_tcp(task, robot)
 
     def at(scene: Scene, up: float) -> Floats:
-        return top(scene) + np.array([0.0, 0.0, up])
+        return top(scene) + np.array([0.0, 0.0, up + low])
 
     return (
         go(f"high {body}", partial(at, up=2 * OVER), near=0.03),
         go(f"over {body}", partial(at, up=OVER), near=0.02),
         go(f"press {body}", partial(at, up=-depth), near=pi, steps=PRESSED, after=tuple(after)),
     )
+
+
+def _below_tcp(task: TaskEnv, robot: str, more: float = 0.0) -> float:
+    """Return how far fingers reach below the TCP, and more (m, as declared); 0 without any."""
+    hand = driven_gripper(task.layout.arm(robot).robot)
+    return 0.0 if hand is None else (hand.beyond + more) / task.task.fit.scale
