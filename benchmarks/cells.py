@@ -166,7 +166,10 @@ def _making(task: str, label: str, robots: Mapping[str, str]) -> dict[str, Any]:
     """Return the robots of a case, or where its own stand."""
     if robots:
         named = {role: robot_of(name) for role, name in robots.items()}
-        return {"robots": named, "max_episode_steps": LONGER * get_task_class(task).max_episode_steps}
+        return {
+            "robots": named,
+            "max_episode_steps": LONGER * get_task_class(task).max_episode_steps,
+        }
     return {"layout": stand_elsewhere(task, seed=int(label.split()[1]))}
 
 

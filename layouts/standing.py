@@ -136,7 +136,7 @@ def _apart(
                 ready = {place: drawn_back(layout[place], middle) for place in arms}
                 layout = Layout({**layout, **ready}, layout.frames)
             report = layout.validate(workspaces=False, samples=NOISES, table=table)
-            found = [finding for finding in report.findings if finding.kind in ("collision", "table")]
+            found = [each for each in report.findings if each.kind in ("collision", "table")]
             if not found:
                 return layout
             share *= max(_factor(layout, finding) for finding in found) if back else 1.0

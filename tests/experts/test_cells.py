@@ -1,5 +1,7 @@
 """The experts of cells: they pass every stage, with the cells' own robots and with others."""
 
+from itertools import cycle
+
 import pytest
 
 import layouts
@@ -44,3 +46,18 @@ def test_a_hand_comes_down_on_a_bracket_as_it_has_set_off():
 def test_tips_of_other_makes_push_and_press(task_id, robots, seed):
     env = tasks.make(task_id, robots=robots)
     assert play(env, seed, find_expert(task_id)(env, seed)).solved
+
+
+@pytest.mark.parametrize(
+    ("task_id", "robots"),
+    [
+        ("CellTwoHandPress-v1", ("koch",)),  # it begins with its joints at their limits
+        ("CellPressInOrder-v1", ("ur3", "fetch")),  # fingers reach below the Fetches' TCPs
+    ],
+)
+def test_arms_of_other_makes_press(task_id, robots):
+    cls = tasks.get_task_class(task_id)
+    steps = 2 * cls.max_episode_steps  # small arms are slow
+    named = dict(zip(cls.layout, cycle(robots), strict=False))
+    env = tasks.make(task_id, robots=named, max_episode_steps=steps)
+    assert play(env, 0, find_expert(task_id)(env, 0)).solved

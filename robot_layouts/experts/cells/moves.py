@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from objects import ObjectDescriptor
+from robot_layouts.experts.cells.tips import FAR, over_table
 from robot_layouts.experts.geometry import backed_off, heading, turn, yaw_of
 from robot_layouts.experts.grasps import (
     PLACE_YAWS,
@@ -312,7 +313,7 @@ def push_shut(
         after: Waypoints of other arms that come before.
         strokes: In how many parts it pushes.
     """
-    go = partial(reaching, task, robot, leans=(0.0, 0.3, 0.6), as_it_is=False, gripper=CLOSED)
+    go = partial(over_table, task, robot, leans=(0.0, 0.3, 0.6), farther=FAR)
 
     def at(scene: Scene, out: float, up: float) -> Floats:
         """The place so far (m) before the handle as it is with the drawer shut."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from math import pi
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ PRESSING = (0.0, 0.3, -0.3, 0.6)
 UPRIGHT, SLANTED = (0.0, 0.15, -0.15), (0.3, 0.6, 0.9, 1.2)  # these where those are out of reach
 HIGH, OVER = 0.14, 0.06  # of tips on their way over the table, and over what they press (m)
 OFF = 0.005  # m; of fingers that push over the table, as they are, not as declared
+DIP = 0.02  # m below the TCP that fingers may reach, wherever tips go
 LEAST = 0.012  # m; of a stroke, unless less is left
 PRESSED = 8  # control steps that pressing takes, however far the tip comes
 BEYOND = 0.15  # m behind its end, where a push aims; so it stays steady near the end
@@ -55,11 +57,9 @@ def push(
         height: Of the TCP over the table (m), or more where fingers reach farther down.
         after: Waypoints of other arms that come before.
     """
-    lean = {"leans": PUSHING, "farther": FAR}
-    go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
+    go = partial(over_table, task, robot, leans=PUSHING, farther=FAR)
     arm = task.layout.arm(robot).robot
     flat = driven_gripper(arm) is not None and not may_swing(arm)
-    low = max(height, _below_tcp(task, robot, OFF))
     line: list[Floats] = []  # where it aims
 
     def aim(scene: Scene) -> tuple[Floats, Floats]:
@@ -78,19 +78,19 @@ def push(
         tip, block = scene.tcp(robot)[0][:2], scene.body(body)[0][:2]
         far, rest = float((tip - target) @ away), float((block - target) @ away) - BEYOND
         start = tip if flat else target + far * away
-        return np.array([*(start - max(rest / left, min(LEAST, rest)) * away), low])
+        return np.array([*(start - max(rest / left, min(LEAST, rest)) * away), height])
 
     def back(scene: Scene, up: float) -> Floats:
         return np.array([*(scene.tcp(robot)[0][:2] + 0.06 * aim(scene)[1]), up])
 
     return (
         go(f"above {body}", partial(behind, up=HIGH), near=0.05, after=tuple(after)),
-        go(f"behind {body}", partial(behind, up=low), near=0.03),
+        go(f"behind {body}", partial(behind, up=height), near=0.03),
         *(
             go(f"push {body} {i}", partial(along, left=strokes - i), near=0.03, pushes=True)
             for i in range(strokes)
         ),
-        go(f"back {body}", partial(back, up=low), near=0.1),
+        go(f"back {body}", partial(back, up=height), near=0.1),
         go(f"away {body}", partial(back, up=HIGH), near=0.1),
     )
 
@@ -124,8 +124,7 @@ def advance(
         beside: Other arms that push the same in step.
         after: Waypoints of other arms that come before the tip comes down.
     """
-    lean = {"leans": UPRIGHT, "farther": SLANTED}
-    go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
+    go = partial(over_table, task, robot, leans=UPRIGHT, farther=SLANTED)
     line: list[Floats] = []  # where it begins, and which way it goes
 
     def at(scene: Scene, up: float) -> Floats:
@@ -180,8 +179,7 @@ def sweep(
         count: In how many parts.
         after: Waypoints of other arms that come before the tip comes down.
     """
-    lean = {"leans": UPRIGHT, "farther": SLANTED}
-    go = partial(reaching, task, robot, **lean, as_it_is=False, gripper=CLOSED)
+    go = partial(over_table, task, robot, leans=UPRIGHT, farther=SLANTED)
 
     def above(scene: Scene) -> Floats:
         return path(scene, 0.0) + np.array([0.0, 0.0, HIGH])
@@ -220,6 +218,30 @@ def press_down(
         go(f"over {body}", partial(at, up=OVER), near=0.02),
         go(f"press {body}", partial(at, up=-depth), near=pi, steps=PRESSED, after=tuple(after)),
     )
+
+
+def over_table(
+    task: TaskEnv, robot: str, name: str, place: Place, *, leans: Sequence[float], **others: Any
+) -> Waypoint:
+    """Return the waypoint that brings a tip to a place, or above it where fingers reach too low.
+
+    Args:
+        task: Says where the arm stands.
+        robot: The arm; its fingers stay closed, if it has some.
+        name: What the waypoint is called.
+        place: Where the TCP should be.
+        leans: See `reaching`.
+        **others: Likewise.
+    """
+    raised = max(0.0, _below_tcp(task, robot) - DIP)
+    lowest = _below_tcp(task, robot, OFF)
+
+    def over(scene: Scene) -> Floats:
+        x, y, z = place(scene)
+        return np.array([x, y, max(z + raised, lowest)])
+
+    as_they_are = {"as_it_is": False, "gripper": CLOSED}
+    return reaching(task, robot, name, over, leans=leans, **as_they_are, **others)
 
 
 def _below_tcp(task: TaskEnv, robot: str, more: float = 0.0) -> float:

@@ -14,7 +14,9 @@ from tasks import TaskEnv
 from tasks.cells.turn_taps import NOTCH, SETTINGS, CellTurnTaps
 
 BEHIND, LEAST = -1.0, 0.12  # rad; of a tip from a handle that is shut, and of a stroke
-RADIUS, HEIGHT = 0.077, 0.168  # of the tip's way about a tap (m)
+HEIGHT = 0.168  # of the tip's way about a tap (m)
+# In how many strokes a tip goes round, and how far from the middle (m); wide tips, outside.
+TRIED = (14, 0.077), (20, 0.077), (20, 0.085), (20, 0.092)
 
 
 def turn_taps(task: TaskEnv, seed: int) -> Plan:
@@ -22,7 +24,7 @@ def turn_taps(task: TaskEnv, seed: int) -> Plan:
     setting = SETTINGS[seed % len(CellTurnTaps.instruction) % len(SETTINGS)]
     wanted = dict(zip(task.layout.arms, setting, strict=True))
 
-    def path(scene: Scene, share: float, arm: str, count: int) -> Floats:
+    def path(scene: Scene, share: float, arm: str, count: int, radius: float) -> Floats:
         """The tip's next place on its way round: a share of what is left, once it began."""
         place, quaternion = scene.body(f"tap_{arm}")
         x, y, _ = rotate(inverse(quaternion), scene.tcp(arm)[0] - place)
@@ -30,15 +32,16 @@ def turn_taps(task: TaskEnv, seed: int) -> Plan:
         strokes = count * (1 - share) + 1
         turn = max(left / strokes, min(LEAST, left))
         angle = np.arctan2(y, x) + turn if share else BEHIND
-        tip = np.array([RADIUS * np.cos(angle), RADIUS * np.sin(angle), HEIGHT])
+        tip = np.array([radius * np.cos(angle), radius * np.sin(angle), HEIGHT])
         return place + rotate(quaternion, tip)
 
-    def script(count: int) -> Script:
+    def script(count: int, radius: float) -> Script:
+        way = partial(path, count=count, radius=radius)
         return {
-            arm: sweep(task, arm, f"tap_{arm}", partial(path, arm=arm, count=count), count=count)
+            arm: sweep(task, arm, f"tap_{arm}", partial(way, arm=arm), count=count)
             for arm in wanted
         }
 
     return first_success(
-        task, seed, lambda scene: [script(count) for count in (14, 20)], as_declared=True
+        task, seed, lambda scene: [script(*tried) for tried in TRIED], as_declared=True
     )
