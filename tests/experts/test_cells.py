@@ -53,9 +53,11 @@ def test_tips_of_other_makes_push_and_press(task_id, robots, seed):
     [
         ("CellTwoHandPress-v1", ("koch",)),  # it begins with its joints at their limits
         ("CellPressInOrder-v1", ("ur3", "fetch")),  # fingers reach below the Fetches' TCPs
+        ("CellSetFaders-v1", ("so101", "fetch")),
+        pytest.param("CellTurnTaps-v1", ("ur3", "ur10"), marks=pytest.mark.long),  # wide flanges
     ],
 )
-def test_arms_of_other_makes_press(task_id, robots):
+def test_arms_of_other_makes_press_push_and_sweep(task_id, robots):
     cls = tasks.get_task_class(task_id)
     steps = 2 * cls.max_episode_steps  # small arms are slow
     named = dict(zip(cls.layout, cycle(robots), strict=False))
