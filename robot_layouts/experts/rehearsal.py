@@ -22,6 +22,8 @@ from tasks import TaskEnv
 from tasks.engine.actions import ActionReader
 from tasks.episode import REBUILT, EpisodeTape, PlayedEpisode, take_step
 
+IDLE = 100  # control steps after all of a script is done in which it may still succeed
+
 
 @dataclass(frozen=True)
 class Attempt:
@@ -140,7 +142,7 @@ class Rehearsal:
         careful: bool = False,
         until: str | None = None,
     ) -> Attempt:
-        """Play a script from the present state until success or the end of the episode.
+        """Play a script from the present state until success, or `IDLE` steps after its end.
 
         It fails as soon as two arms touch, robots or limbs of one robot, or the task is lost.
 
@@ -165,7 +167,8 @@ class Rehearsal:
                 player.look_around(ways, players)
         done: set[str] = set()
         actions: list[NDArray[np.float32]] = []
-        while len(actions) < task.max_episode_steps:
+        number, idle = sum(map(len, script.values())), 0
+        while len(actions) < task.max_episode_steps and idle < IDLE:
             try:
                 parts = [player.act(scene, done) for player in players]
             except StuckError as error:
@@ -173,6 +176,7 @@ class Rehearsal:
                 return Attempt(_stack(actions, task), False, str(error), blocked)
             if until in done:
                 return Attempt(_stack(actions, task), True)
+            idle += len(done) == number
             actions.append(np.concatenate(parts).astype(np.float32))
             solved, lost = self.step(actions[-1])
             scene = self.scene()
@@ -181,7 +185,8 @@ class Rehearsal:
             if solved:
                 return Attempt(_stack(actions, task), True)
         places = ", ".join(player.place for player in players)
-        return Attempt(_stack(actions, task), False, f"the episode ended at {places}")
+        ended = "the episode ended" if idle < IDLE else "the script ended without success"
+        return Attempt(_stack(actions, task), False, f"{ended} at {places}")
 
 
 # Making one takes as long as half an episode, and each episode begins in a world built anew.

@@ -11,6 +11,7 @@ from robot_layouts.experts import find_expert
 from tasks.episode import play
 
 UR5_AND_Z1 = {"south": "ur5", "east": "z1", "north": "ur5", "west": "z1"}
+STICK_AND_FLANGE = {"west": "panda_stick", "east": "xarm7", "pusher": "panda_stick"}
 CELLS = [name for name in tasks.list_tasks() if name.startswith("Cell")]
 
 
@@ -41,6 +42,7 @@ def test_a_hand_comes_down_on_a_bracket_as_it_has_set_off():
         ("CellTwoHandPress-v1", {"loader": "panda"}, 1),  # a flat tip, to which the block sticks
         pytest.param("CellGatherBlocks-v1", UR5_AND_Z1, 0, marks=pytest.mark.long),  # z1s lean far
         pytest.param("CellSqueezeBox-v1", "xarm7", 0, marks=pytest.mark.long),  # is wide
+        pytest.param("CellSqueezeBox-v1", STICK_AND_FLANGE, 0, marks=pytest.mark.long),
     ],
 )
 def test_tips_of_other_makes_push_and_press(task_id, robots, seed):

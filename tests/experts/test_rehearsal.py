@@ -70,6 +70,14 @@ def test_a_plan_that_fails_is_returned_as_it_is():
     assert not play(task, 0, actions).solved
 
 
+def test_a_script_that_is_done_has_some_time_to_succeed():
+    task = tasks.make("PickCube-v1", max_episode_steps=400)
+    script = {"arm": PICK["arm"][:1]}  # above the cube, and no farther
+    actions = first_success(task, 0, lambda scene: [script])
+    assert len(actions) < 200
+    assert actions.reason == "the script ended without success at arm.above"
+
+
 def test_no_plan_at_all_is_an_error():
     script = {"arm": (Waypoint("far", nowhere),)}
     with pytest.raises(TaskError, match=r"^no plan: arm\.far is out of reach"):

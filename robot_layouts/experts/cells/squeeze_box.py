@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
+from itertools import product
 from math import pi
 
 import numpy as np
@@ -40,14 +42,16 @@ def squeeze_box(task: TaskEnv, seed: int) -> Plan:
     )
 
 
-def _widths(task: TaskEnv) -> list[float]:
-    """Return how far outside the middle of a tip without fingers may have to stay (m)."""
-    return (
-        [0.0, FLANGE] if any(task.layout.arm(arm).robot.fingers is None for arm in SIDES) else [0.0]
-    )
+def _widths(task: TaskEnv) -> list[dict[str, float]]:
+    """Return how far outside the middle of tips without fingers may have to stay, by arm (m)."""
+    tips = [arm for arm in SIDES if task.layout.arm(arm).robot.fingers is None]
+    found = [
+        dict(zip(tips, wide, strict=True)) for wide in product((0.0, FLANGE), repeat=len(tips))
+    ]
+    return sorted(found, key=lambda wide: len({*wide.values()}))  # alike ones first
 
 
-def _script(task: TaskEnv, deep: float, strokes: int, wide: float) -> Script:
+def _script(task: TaskEnv, deep: float, strokes: int, wide: Mapping[str, float]) -> Script:
     start: list[Floats] = []  # where the box stood
 
     def under(scene: Scene) -> Floats:
@@ -58,14 +62,11 @@ def _script(task: TaskEnv, deep: float, strokes: int, wide: float) -> Script:
     )
     return {
         "pusher": (*pushing, stand_back(task, "pusher")),
-        **{arm: _pressing(task, arm, deep, wide, start) for arm in SIDES},
+        **{arm: _pressing(task, arm, wide.get(arm, 0.0) - deep, start) for arm in SIDES},
     }
 
 
-def _pressing(
-    task: TaskEnv, arm: str, deep: float, wide: float, start: list[Floats]
-) -> tuple[Waypoint, ...]:
-    out = (wide if task.layout.arm(arm).robot.fingers is None else 0.0) - deep
+def _pressing(task: TaskEnv, arm: str, out: float, start: list[Floats]) -> tuple[Waypoint, ...]:
     (other,) = (each for each in SIDES if each != arm)
     lean = {"leans": (0.0,), "farther": LEANS}
     go = partial(reaching, task, arm, **lean, as_it_is=False, gripper=CLOSED)
