@@ -185,8 +185,8 @@ class Rehearsal:
             if solved:
                 return Attempt(_stack(actions, task), True)
         places = ", ".join(player.place for player in players)
-        ended = "the episode ended" if idle < IDLE else "the script ended without success"
-        return Attempt(_stack(actions, task), False, f"{ended} at {places}")
+        ended = "episode" if idle < IDLE else "script"
+        return Attempt(_stack(actions, task), False, f"the {ended} ended at {places}")
 
 
 # Making one takes as long as half an episode, and each episode begins in a world built anew.
