@@ -39,7 +39,7 @@ from tasks.episode import play
 ROBOTS = ("so101", "xarm7", "xarm7_with_panda", "z1", "fetch", "ur10")
 # Every two of these, by reach, take the roles of some cells in turn.
 PAIRED = "koch so100 so101 ur3 xarm7 xarm7_with_panda panda panda_stick z1 ur5 fetch ur10".split()
-LONGER = 2  # than with their own robots are episodes; small arms are slow in their control modes
+LONGER = 2  # times as many steps as with their own robots; small arms move slowly
 PATIENCE = 150  # s that an expert may plan an episode
 MIXED = (
     ("CellPressTogether-v1", ("ur10", "panda", "xarm7")),

@@ -362,7 +362,7 @@ class Player:
 
         They are sought from the present ones, and from those turned towards the place by the
         first joint, which turns an arm about its base. Where those lead nowhere, as they may from
-        limits of joints, they are sought from the middle of what the others can do.
+        limits of joints, they are sought with the other joints in the middle of their ranges.
         """
         arm, tip = self._reach.arm(scene.qpos(self._robot)), scene.tcp(self._robot)[0]
         point = self._in_link(scene, arm)
