@@ -3,6 +3,7 @@
 import json
 import shutil
 from contextlib import closing
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -186,11 +187,20 @@ def test_what_the_page_of_the_ladder_promises():
             assert {*found["touching"]} <= {*tested}
             assert bool(receipt.making["randomization"]) == (name != OWN)
             example = "imitate_images" if "size" in recipe else "imitate"
-            assert receipt.policy["name"] == f"{example}:policy"
+            module = "lerobot_env_robot_layouts.policies" if "policy" in recipe else example
+            assert receipt.policy["name"] == f"{module}:policy"
             assert receipt.policy["files"]
             assert receipt.task == describe_task(get_task_class(recipe["task"]))
             robots = [place["robot"] for place in receipt.making["layout"].values()]
             assert robots == one["arms"]
+
+
+@pytest.mark.skipif(find_spec("lerobot") is not None, reason="LeRobot is installed")
+def test_the_ladder_says_that_it_lacks_lerobot(tmp_path, capsys):
+    words = ["--learner", "act", "--tasks", "CellCloseDrawers-v1"]
+    assert main(["ladder", *words, "--runs", str(tmp_path), "--out", str(tmp_path / "l.json")]) == 2
+    assert "error: act is trained by LeRobot, which is not installed" in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]
 
 
 def test_nothing_portable_differs():

@@ -41,16 +41,21 @@ def successes(reported: dict[str, Any], task: str) -> list[bool]:
     return found["metrics"]["successes"]
 
 
-def train(dataset: Path, folder: Path, *words: str) -> Path:
-    """Let ``lerobot-train`` train a tiny ACT, and return the folder of the policy."""
+TINY_ACT = (
+    *("--policy.type=act", "--policy.chunk_size=20", "--policy.n_action_steps=20"),
+    *("--policy.dim_model=64", "--policy.n_heads=2", "--policy.dim_feedforward=128"),
+    *("--policy.n_encoder_layers=1", "--policy.use_vae=false"),
+)
+TINY_DIFFUSION = ("--policy.type=diffusion", "--policy.down_dims=[16,32]", "--policy.n_groups=4")
+
+
+def train(dataset: Path, folder: Path, *words: str, policy: tuple[str, ...] = TINY_ACT) -> Path:
+    """Let ``lerobot-train`` train a tiny policy, and return the folder of the policy."""
     command(
-        "lerobot-train", "--dataset.repo_id=local/pair", f"--dataset.root={dataset}",
-        "--policy.type=act", "--policy.device=cpu", "--policy.push_to_hub=false",
-        "--policy.chunk_size=20", "--policy.n_action_steps=20", "--policy.dim_model=64",
-        "--policy.n_heads=2", "--policy.dim_feedforward=128", "--policy.n_encoder_layers=1",
-        "--policy.use_vae=false", "--policy.pretrained_backbone_weights=null",
-        "--num_workers=0", "--env_eval_freq=0", "--wandb.enable=false", f"--output_dir={folder}",
-        *words,
+        "lerobot-train", "--dataset.repo_id=local/pair", f"--dataset.root={dataset}", *policy,
+        "--policy.device=cpu", "--policy.push_to_hub=false",
+        "--policy.pretrained_backbone_weights=null", "--num_workers=0", "--env_eval_freq=0",
+        "--wandb.enable=false", f"--output_dir={folder}", *words,
     )  # fmt: skip
     return folder / "checkpoints" / "last" / "pretrained_model"
 

@@ -5,12 +5,20 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from lerobot_commands import command, evaluated, install_replay, successes, train
+from lerobot_commands import (
+    TINY_DIFFUSION,
+    command,
+    evaluated,
+    install_replay,
+    successes,
+    train,
+)
 from lerobot_env_robot_layouts import LeRobotPolicy, RobotLayoutsEnv
 
 from robot_layouts.data import evaluate
 from robot_layouts.data.export.dataset import Export, export
 from robot_layouts.data.reading.recording import Recording
+from robot_layouts.data.receipts import Receipt
 from robot_layouts.data.recording.record import record
 from tasks.interfaces.lerobot import STATES
 
@@ -44,6 +52,24 @@ def trained_policies_play(folder: Path, recording: Path) -> None:
     returns = reported["per_task"][0]["metrics"]["sum_rewards"]
     sums = np.float32([*ours.returns.values()])  # LeRobot adds in another order
     assert np.allclose(returns, sums, rtol=1e-6, atol=0), (returns, sums)
+
+
+def receipts_of_noisy_policies_verify(folder: Path) -> None:
+    """A diffusion policy draws noise for every chunk, and the same in whatever order it plays."""
+    words = "--steps=2", "--batch_size=4"
+    policy = train(folder / "dataset", folder / "diffusion", *words, policy=TINY_DIFFUSION)
+    named, receipt = "lerobot_env_robot_layouts.policies:policy", str(folder / "receipt.json")
+    variables = {"LEROBOT_POLICY": str(policy), "LEROBOT_TASK": TASK}
+    words = "--task", TASK, "--policy", named, "--obs-mode", "lerobot", "--workers", "0"
+    command(
+        "robot-layouts", "evaluate", *words, "--episodes", "3", "--seed", "5",
+        "--receipt", receipt, **variables,
+    )  # fmt: skip
+    said = command("robot-layouts", "verify", receipt, "--policy", named, **variables)
+    assert "3 of 3 episodes equal" in said
+    os.environ |= variables
+    alone = evaluate(named, TASK, [7], workers=0, obs_mode="lerobot")
+    assert alone.returns[7] == Receipt.read(Path(receipt)).episodes[2].total
 
 
 def successes_are_those_of_our_evaluation(folder: Path, recording: Path) -> None:
@@ -120,6 +146,7 @@ def main(folder: Path) -> None:
     names_are_those_of_datasets()
     successes_are_those_of_our_evaluation(folder, recording)
     trained_policies_play(folder, recording)
+    receipts_of_noisy_policies_verify(folder)
     several_tasks_are_evaluated_one_by_one(folder)
 
 
