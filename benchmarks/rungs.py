@@ -193,7 +193,7 @@ class LeRobot(Rung):
             **{"pretrained_backbone_weights": "null", "optimizer_lr": 5e-4},
         },
         "diffusion": {
-            **{"horizon": 16, "n_action_steps": 4, "down_dims": "[64,128,256]"},
+            **{"horizon": 16, "n_action_steps": 4, "down_dims": "[64,128]"},
             **{"noise_scheduler_type": "DDIM", "num_inference_steps": 10},
             **{"pretrained_backbone_weights": "null", "optimizer_lr": 5e-4},
         },
