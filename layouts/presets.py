@@ -8,7 +8,8 @@ to serve several pairs of neighbours, it is that of the pair that asks for the m
 not an arm of the catalogue, or has wheels, the robots' files are read, and more is seen to:
 
 - A robot whose wheels or feet are lower than its base is raised by as much, and a driven torso
-  starts where its arm works on the ground.
+  starts where its arm works on the ground. One whose arm still begins too high for that stands
+  lower, as before a table, with its hand over it.
 - Neighbours in a row or face to face are moved together until they share places near the
   ground, with their grippers down, as two Pandas do.
 - As by `Layout.validate`, robots are moved apart until none collide. If one collides with itself,

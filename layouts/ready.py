@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,17 +19,24 @@ from layouts.shared_place import (
     drawn_postures,
     inside_table,
     places_and_approaches,
+    standing_corners,
 )
 from layouts.validation.collisions import moving_hulls, noisy_postures
+from robot_layouts.kinematics.quaternions import forward
 from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix, transform
 from robot_layouts.kinematics.solve import IkGoal, shortfalls, solve
 from robot_layouts.kinematics.tree import FIXED, Tree
 from robots.bodies.hulls import load_model
+from robots.descriptor import Vector3
 from robots.gripper_motion import aiming_joints, gripper_frame, link_tree
 from robots.urdf.tcp import find_tcp
 
+if TYPE_CHECKING:
+    from layouts.layout import Layout
+
 CLEARANCE, STEP = 0.02, 0.01  # m: from a body to the table; in which it is moved back
 POSTURES = 21  # of a torso that are looked at
+TALL = 0.75  # of a reach: how high above a robot's base its arm begins at most to work down there
 HIGHEST = 0.5  # of a reach, by which a robot is raised at most
 HEIGHT = 0.22  # of a reach: how high above the ground hands wait
 BACK = 0.35  # of a reach: how far ahead a hand waits that is drawn back
@@ -74,7 +82,8 @@ def made_ready(
 def drawn_back(placement: Placement, place: tuple[float, float]) -> Placement:
     """Return the placement of an arm that starts with its hand near it, gripper down.
 
-    One that has no such posture stays as it is.
+    One that has no such posture stays as it is. It works level with its base, or at z = 0 if it
+    stands lower.
 
     Args:
         placement: The arm.
@@ -86,7 +95,8 @@ def drawn_back(placement: Placement, place: tuple[float, float]) -> Placement:
     """
     base, reach = np.array(placement.base_position), placement.robot.reach
     ahead = np.array((*place, base[2])) - base
-    at = base + BACK * reach * ahead / np.linalg.norm(ahead) + (0.0, 0.0, HEIGHT * reach)
+    at = base + BACK * reach * ahead / np.linalg.norm(ahead)
+    at[2] = max(base[2], 0.0) + HEIGHT * reach
     return _over(placement, "", at, None, np.random.default_rng(0))
 
 
@@ -110,22 +120,29 @@ def _over(
 def grounded(placement: Placement) -> Placement:
     """Return the placement of a robot that starts as `stooped`, and is raised by its `lift`.
 
+    One that stands lower then begins with its hand over the table that is before it.
+
     Args:
         placement: The robot, upright.
 
     Raises:
         AssetError: If robot files cannot be found.
+        MissingPackageError: If one stands lower, and python-fcl is not installed.
     """
     start = stooped(placement)
     x, y, z = start.local_pose.position
+    if z < placement.local_pose.position[2]:
+        ahead_x, ahead_y, _ = forward(start.facing)
+        return drawn_back(start, (x + ahead_x, y + ahead_y))
     return replace(start, position=(x, y, z + lift(start)))
 
 
 def stooped(placement: Placement) -> Placement:
-    """Return the placement of a robot whose torso, if one is driven that slides, starts low enough.
+    """Return the placement of a robot that starts with its shoulder low enough.
 
-    Its arm begins `SHOULDER` of its reach above the robot's base, or as near to that as it
-    can. A robot without such a torso stays as it is.
+    Its arm begins `SHOULDER` of its reach above what it works on, or as near to that as its torso
+    can, if it has one that slides and is driven. Where it still begins higher than `TALL` of its
+    reach, a robot with one arm that stands in no frame stands so much lower, as before a table.
 
     Args:
         placement: The robot, upright.
@@ -137,10 +154,12 @@ def stooped(placement: Placement) -> Placement:
     path = tree.path(find_tcp(robot, tree).turned)
     drivers = [tree.coordinates[at] if at != FIXED else "" for at in tree.drivers]
     aiming, qpos = aiming_joints(robot, robot), np.array(placement.start_qpos)
+    shoulder = next((link for link in path if drivers[link] in aiming), None)
+    if shoulder is None:
+        return placement
     for joint in (drivers[link] for link in path if tree.slides[link]):
         if joint not in robot.arm_joints or joint in aiming:
             continue
-        shoulder = next(link for link in path if drivers[link] in aiming)
         column = robot.joints.index(joint)
         rows = np.tile(qpos, (POSTURES, 1))
         low, high = np.clip(tree.limits[column], -robot.reach, robot.reach)
@@ -148,9 +167,13 @@ def stooped(placement: Placement) -> Placement:
         heights = tree.forward(rows)[:, shoulder, 2, 3]
         off = np.abs(heights - SHOULDER * robot.reach)
         qpos = rows[np.argmin(off.round(3))]
-    if np.array_equal(qpos, placement.start_qpos):
+    if not np.array_equal(qpos, placement.start_qpos):
+        placement = replace(placement, keyframe=None, qpos=qpos.tolist())
+    height = float(tree.forward(qpos[None])[0, shoulder, 2, 3])
+    if height <= TALL * robot.reach or placement.on is not None or robot.limbs:
         return placement
-    return replace(placement, keyframe=None, qpos=qpos.tolist())
+    x, y, z = placement.local_pose.position
+    return replace(placement, position=(x, y, round(z + SHOULDER * robot.reach - height, 3)))
 
 
 def lift(placement: Placement) -> float:
@@ -206,6 +229,52 @@ def off_the_table(
     return replace(
         placement, position=(round(x - back * ahead[0], 4), round(y - back * ahead[1], 4), z)
     )
+
+
+def before_robots(table: Rectangle, layout: Layout) -> Rectangle:
+    """Return the outline of a table that ends before robots whose bases are lower than its top.
+
+    It is cut along one side for each of them that would stand in it: where all other robots stay
+    on it, if there is such a side, and where most of it is left.
+
+    Args:
+        table: Its outline, if none were lower; its top is at z = 0: x_min, y_min, x_max, y_max (m).
+        layout: The robots.
+
+    Raises:
+        AssetError: If the files of robots that are lower cannot be found.
+    """
+    lower = [placement for placement in layout.values() if placement.base_position[2] < 0]
+    others = [at.base_position for at in layout.values() if at not in lower]
+    for placement in lower:
+        corners = standing_corners(placement)
+        inside = corners[inside_table(corners, table)]
+        if not inside.size:
+            continue
+        (low_x, low_y), (high_x, high_y) = (
+            inside[:, :2].min(0) - CLEARANCE,
+            inside[:, :2].max(0) + CLEARANCE,
+        )
+        x_min, y_min, x_max, y_max = table
+        rests = [
+            (x_min, y_min, low_x, y_max),
+            (high_x, y_min, x_max, y_max),
+            (x_min, y_min, x_max, low_y),
+            (x_min, high_y, x_max, y_max),
+        ]
+        table = max(rests, key=lambda rest: (_kept(rest, others), _area(rest)))
+    x_min, y_min, x_max, y_max = map(float, table)
+    return x_min, y_min, x_max, y_max
+
+
+def _kept(table: Rectangle, places: Sequence[Vector3]) -> int:
+    x_min, y_min, x_max, y_max = table
+    return sum(x_min < x < x_max and y_min < y < y_max for x, y, _ in places)
+
+
+def _area(table: Rectangle) -> float:
+    x_min, y_min, x_max, y_max = table
+    return max(x_max - x_min, 0.0) * max(y_max - y_min, 0.0)
 
 
 def _postures(placement: Placement, limb: str, target: Floats) -> Floats:

@@ -157,7 +157,9 @@ def _share_down(layout: Arrangement, place: str) -> float:
         points, approaches = places_and_approaches(owner.robot, arm.robot, body)
     except AssetError:
         return 1.0
-    points = (transform(base, points) - arm.base_position) / arm.robot.reach
+    x, y, z = arm.base_position
+    ground = z if owner.robot.limbs else max(z, 0.0)  # one that stands lower works at z = 0
+    points = (transform(base, points) - (x, y, ground)) / arm.robot.reach
     upright = points[(approaches @ base[:3, :3].T)[:, 2] < -_UPRIGHT]
     levels = [upright[(low < upright[:, 2]) & (upright[:, 2] <= high)] for low, high in _LEVELS]
     if sum(map(len, levels)) < _MANY:
@@ -238,8 +240,20 @@ def _carried(tree: Tree, robot: RobotDescriptor, part: RobotDescriptor) -> froze
 
 def body_corners(placement: Placement) -> Floats:
     """Return the corners of a robot's hulls that no limb carries, (n, 3) (m, world)."""
+    robot = placement.robot
+    return _corners(placement, [robot.parts[limb] for limb in robot.limbs])
+
+
+def standing_corners(placement: Placement) -> Floats:
+    """Return the corners of a robot's hulls that no arm carries, (n, 3) (m, world)."""
+    robot = placement.robot
+    return _corners(placement, [robot.parts[limb] for limb in robot.limbs] or [robot])
+
+
+def _corners(placement: Placement, parts: Iterable[RobotDescriptor]) -> Floats:
+    """Return the corners of a robot's hulls that none of its parts carries, (n, 3) (m, world)."""
     model, robot = load_model(placement.robot), placement.robot
-    limbs = [_carried(model.kinematics, robot, robot.parts[limb]) for limb in robot.limbs]
+    limbs = [_carried(model.kinematics, robot, part) for part in parts]
     base = pose_matrix(placement.base_position, placement.base_quaternion)
     poses = base @ model.kinematics.forward(np.array([placement.start_qpos]))[0]
     body = [hull for hull in model.hulls if not any(hull.link in links for links in limbs)]

@@ -49,7 +49,8 @@ def at_task(
     towards it and at the same height: as much nearer as it reaches less than that one of the task's
     own which reaches least, and farther only as far as all robots reach farther. What a robot
     holds it has to reach with its gripper down. It is raised, if its wheels or feet are lower than
-    its base. Robots that would collide as they start begin with their hands drawn back, and stand
+    its base, and stands before the task's table, if its shoulder is too high to work on it. Robots
+    that would collide as they start begin with their hands drawn back, and stand
     farther from the middle if that is not enough, where their files are at hand.
 
     One robot of several limbs serves several places at once: its limbs are called like them, the
@@ -126,7 +127,7 @@ def _apart(
         middle: Of what they work on, x and y (m).
         table: Outline of the task's own table, which they are not to touch either.
     """
-    from layouts.ready import drawn_back
+    from layouts.ready import before_robots, drawn_back
 
     share, back = 1.0, False
     with suppress(AssetError, MissingPackageError):  # else their bodies are not known here
@@ -135,7 +136,8 @@ def _apart(
             if back:
                 ready = {place: drawn_back(layout[place], middle) for place in arms}
                 layout = Layout({**layout, **ready}, layout.frames)
-            report = layout.validate(workspaces=False, samples=NOISES, table=table)
+            cut = before_robots(table, layout) if table is not None else None
+            report = layout.validate(workspaces=False, samples=NOISES, table=cut)
             found = [each for each in report.findings if each.kind in ("collision", "table")]
             if not found:
                 return layout

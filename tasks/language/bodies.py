@@ -42,7 +42,9 @@ from tasks.language.props import (
     RED,
     TARGET_HEIGHT,
     add_kitchen_counter,
+    add_slab,
     add_wide_table,
+    before_robots,
     peg_shapes,
     target_shapes,
     wide_table_outline,
@@ -508,11 +510,18 @@ class Table(Surroundings):
 
     def outline(self, layout: Layout) -> Rectangle:
         """Return the outline of its top: x_min, y_min, x_max, y_max (m)."""
-        return TABLE_OUTLINE
+        return before_robots(TABLE_OUTLINE, layout)
 
     def add_to(self, world: World, name: str) -> None:
-        """Build it; its body is called ``table-workspace``, as in native."""
-        add_table(world, textured=self.textured)
+        """Build it; its body is called ``table-workspace``, as in native.
+
+        A smaller one, before robots that stand lower, is a plain slab called ``table``.
+        """
+        outline = self.outline(world.layout)
+        if outline == TABLE_OUTLINE:
+            add_table(world, textured=self.textured)
+        else:
+            add_slab(world, outline)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from math import cos, pi, sin
 import numpy as np
 
 from layouts import Layout
+from layouts.frames import Rectangle
 from objects import ObjectDescriptor, ObjectRegistry
 from objects.shapes import Color
 from objects.solids import lowest
@@ -165,7 +166,16 @@ def wide_table_outline(
     """
     bases = np.array([*(placement.base_position[:2] for placement in layout.values()), *others])
     (x_min, y_min), (x_max, y_max) = bases.min(0) - TABLE_MARGIN, bases.max(0) + TABLE_MARGIN
-    return float(x_min), float(y_min), float(x_max), float(y_max)
+    return before_robots((float(x_min), float(y_min), float(x_max), float(y_max)), layout)
+
+
+def before_robots(outline: Rectangle, layout: Layout) -> Rectangle:
+    """Return the outline of a table that ends before robots whose bases are lower than its top."""
+    if all(placement.base_position[2] >= 0 for placement in layout.values()):
+        return outline
+    from layouts.ready import before_robots as cut
+
+    return cut(outline, layout)
 
 
 def add_kitchen_counter(world: World, scale: float = 1.0) -> None:
@@ -193,13 +203,18 @@ def add_kitchen_counter(world: World, scale: float = 1.0) -> None:
 def add_wide_table(world: World, others: Sequence[tuple[float, float]] = ()) -> None:
     """Add a table under all robots of a layout, its top at z = 0, and the floor below it.
 
-    It ends `TABLE_MARGIN` beyond the outermost bases.
+    It ends `TABLE_MARGIN` beyond the outermost bases, and before those that are lower than its top.
 
     Args:
         world: The world; its layout says where the bases are.
         others: Places that it lies under like under bases, x and y (m).
     """
-    x_min, y_min, x_max, y_max = wide_table_outline(world.layout, others)
+    add_slab(world, wide_table_outline(world.layout, others))
+
+
+def add_slab(world: World, outline: Rectangle) -> None:
+    """Add a table of an outline, its top at z = 0, and the floor below it."""
+    x_min, y_min, x_max, y_max = outline
     x, half_x = (x_min + x_max) / 2, (x_max - x_min) / 2
     y, half_y = (y_min + y_max) / 2, (y_max - y_min) / 2
     slab = Box(half_size=(half_x, half_y, TABLE_THICKNESS / 2), color=WOOD)
