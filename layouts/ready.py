@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 CLEARANCE, STEP = 0.02, 0.01  # m: from a body to the table; in which it is moved back
 POSTURES = 21  # of a torso that are looked at
 TALL = 0.75  # of a reach: how high above a robot's base its arm begins at most to work down there
+FINGER = 3  # joints of a finger; what has no more does not point a gripper down
 HIGHEST = 0.5  # of a reach, by which a robot is raised at most
 HEIGHT = 0.22  # of a reach: how high above the ground hands wait
 BACK = 0.35  # of a reach: how far ahead a hand waits that is drawn back
@@ -142,7 +143,8 @@ def stooped(placement: Placement) -> Placement:
 
     Its arm begins `SHOULDER` of its reach above what it works on, or as near to that as its torso
     can, if it has one that slides and is driven. Where it still begins higher than `TALL` of its
-    reach, a robot with one arm that stands in no frame stands so much lower, as before a table.
+    reach, a robot with one arm that stands in no frame stands so much lower, as before a table;
+    fingers, which hang from a frame of their own, do not.
 
     Args:
         placement: The robot, upright.
@@ -170,7 +172,7 @@ def stooped(placement: Placement) -> Placement:
     if not np.array_equal(qpos, placement.start_qpos):
         placement = replace(placement, keyframe=None, qpos=qpos.tolist())
     height = float(tree.forward(qpos[None])[0, shoulder, 2, 3])
-    if height <= TALL * robot.reach or placement.on is not None or robot.limbs:
+    if height <= TALL * robot.reach or len(aiming) <= FINGER or robot.limbs or placement.on:
         return placement
     x, y, z = placement.local_pose.position
     return replace(placement, position=(x, y, round(z + SHOULDER * robot.reach - height, 3)))
