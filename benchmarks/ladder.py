@@ -1,9 +1,9 @@
 """``python -m benchmarks ladder``: what is learned of the cells, and how well it plays.
 
-Each task is learned from a few of its expert's episodes, as `benchmarks.rungs` says, and played
-with unseen seeds by ``robot-layouts evaluate``, whose receipts hold how each episode went. All
-that runs in processes of its own, with the words that users would type. Then the episodes are
-played once more here, and it is noted in which of them arms touch each other.
+Each task is learned from a few of its expert's episodes or from its reward, as `benchmarks.rungs`
+says, and played with unseen seeds by ``robot-layouts evaluate``, whose receipts hold how each
+episode went. All that runs in processes of its own, with the words that users would type. Then the
+episodes are played once more here, and it is noted in which of them arms touch each other.
 """
 
 from __future__ import annotations
@@ -27,15 +27,7 @@ from benchmarks.records import (
     write_page,
     write_record,
 )
-from benchmarks.rungs import (
-    EPISODES,
-    MODE,
-    STEPS,
-    Imitation,
-    LeRobot,
-    Rung,
-    run,
-)
+from benchmarks.rungs import EPISODES, STEPS, Imitation, LeRobot, Reinforced, Rung, run
 from robot_layouts.data.receipts import Receipt
 from robot_layouts.data.suite.results import result_of, wilson
 from robot_layouts.experts.touching import ArmWatch
@@ -56,7 +48,10 @@ ELSEWHERE = ("CellPressTogether-v1",)  # also played by arms that stand elsewher
 SHIFTS = (0.01, 0.05)  # m, how far each base is moved at most along x and along y
 FIRST_TEST = 1_000_000  # seed; experts were recorded with those from 0 on
 OWN = "its own"
-NAMES = {"act": "ACT", "diffusion": "diffusion policy", "pictures": "pictures"}
+NAMES = {
+    **{"act": "ACT", "diffusion": "diffusion policy", "pictures": "pictures"},
+    **{"ppo": "PPO", "mappo": "MAPPO"},
+}
 COLUMNS = (
     *("task", "arms", "learned from", "layout"),
     *("success (%)", "stage score", "steps", "arms touch", "minutes"),
@@ -67,26 +62,27 @@ def ladder(
     *,
     tasks: tuple[str, ...] = TASKS,
     robots: str = "",
-    learner: Literal["imitation", "act", "diffusion"] = "imitation",
+    learner: Literal["imitation", "act", "diffusion", "ppo", "mappo"] = "imitation",
     pictures: bool = False,
-    episodes: int = EPISODES,
-    steps: int = STEPS,
+    episodes: int | None = None,
+    steps: int | None = None,
     seeds: tuple[int, ...] = (0,),
     tests: int = 50,
     elsewhere: tuple[str, ...] = ELSEWHERE,
     runs: Path = Path("runs/ladder"),
     out: Path = DOCS / "ladder.json",
 ) -> int:
-    """Let a policy learn each task from its expert, and play seeds that it has not seen.
+    """Let a policy learn each task from its expert or its reward, and play unseen seeds.
 
     Args:
         tasks: Task ids; what is in the record is neither learned nor played again.
         robots: Others than the tasks' own: one name for all places, or ``PLACE=ROBOT,…``.
-        learner: The networks of examples/imitate.py, or a policy that LeRobot trains, which has to
-            be installed beside this.
+        learner: The networks of examples/imitate.py; a policy that LeRobot trains; or PPO or MAPPO,
+            which learn from the reward. Their packages have to be installed beside this.
         pictures: With imitation: learn from pictures, and from what robots sense of themselves.
-        episodes: Of the expert, to learn from.
-        steps: Batches to learn from.
+        episodes: Of the expert, to learn from; 80 by default. PPO and MAPPO take none.
+        steps: Batches to learn from, 4,000 by default; of PPO and MAPPO, steps of the task,
+            1,000,000 by default.
         seeds: Of the first weights and the batches, one for each network; those after the first
             learn from the episodes that were recorded for 0.
         tests: Episodes to play.
@@ -99,15 +95,12 @@ def ladder(
         RobotLayoutsError: If something cannot be learned, played, read or written.
     """
     torch.set_num_threads(1)
-    record = read_record(out, versions={}, lerobot_versions={}, tasks={})
+    record = read_record(out, versions={}, tasks={})
     receipts = out.parent / "receipts" / "ladder"
-    versions = "versions" if learner == "imitation" else "lerobot_versions"
+    sizes = {"episodes": episodes, "steps": steps}
+    told = {"robots": robots, **{name: size for name, size in sizes.items() if size is not None}}
     for task, seed in product(tasks, seeds):
-        rung = (
-            Imitation(task, episodes, steps, robots, seed, pictures)
-            if learner == "imitation"
-            else LeRobot(task, episodes, steps, robots, seed, learner)
-        )
+        rung = _rung(learner, pictures, task=task, seed=seed, **told)
         if rung.name not in record["tasks"]:
             record["tasks"][rung.name] = _learned(rung, runs)
             write_record(out, record)
@@ -118,13 +111,12 @@ def ladder(
                 moved = f"_{1000 * shift:.0f}mm" if shift else ""
                 receipt = receipts / f"{rung.name}{moved}.json"
                 seen["layouts"][name] = _played(rung, file, shift, tests, receipt)
-                record[versions] |= rung.versions()
+                record["versions"][rung.FAMILY] = rung.versions()
                 write_record(out, record)
     write_page(
         out,
         "ladder",
         versions=record["versions"],
-        lerobot_versions=record["lerobot_versions"],
         table=table(
             COLUMNS,
             [row for _, seen in sorted(record["tasks"].items()) for row in _rows(seen)],
@@ -133,6 +125,14 @@ def ladder(
         recipe={"episodes": EPISODES, "steps": STEPS},
     )
     return 0
+
+
+def _rung(learner: str, pictures: bool, **told: Any) -> Rung:
+    if learner == "imitation":
+        return Imitation(**told, pictures=pictures)
+    if learner in Reinforced.LIBRARIES:
+        return Reinforced(**told, learner=learner)
+    return LeRobot(**told, learner=learner)
 
 
 def _learned(rung: Rung, runs: Path) -> Record:
@@ -155,7 +155,7 @@ def _played(rung: Rung, file: Path, shift: float, tests: int, receipt: Path) -> 
     """Play the test seeds, write their receipt, and return how they went."""
     receipt.parent.mkdir(parents=True, exist_ok=True)
     varied = Randomization(bases={"*": Shift(x=_upto(shift), y=_upto(shift))}) if shift else None
-    how: list[Any] = ["--control-mode", MODE, *rung.observed]
+    how: list[Any] = ["--control-mode", rung.MODE, *rung.observed]
     if rung.robots:
         how += ["--robots", *rung.robots.split(",")]
     if varied is not None:
@@ -205,7 +205,8 @@ def _touching(
 def _rows(seen: Record) -> Iterator[Sequence[str]]:
     recipe = seen["recipe"]
     kind = recipe.get("policy", "pictures" if "size" in recipe else "")
-    learned = f"{recipe['episodes']} episodes, {recipe['steps']:,} batches"
+    of = f"{recipe['episodes']} episodes, " if recipe["episodes"] else "its reward, "
+    learned = f"{of}{recipe['steps']:,} {'batches' if recipe['episodes'] else 'steps'}"
     learned += f", {NAMES[kind]}" if kind else ""
     if recipe["seed"]:
         learned = f"the same, with seed {recipe['seed']}"

@@ -1,4 +1,4 @@
-"""What learns on the ladder: the networks of the examples, and LeRobot's policies."""
+"""What learns on the ladder: the policies of the examples, and LeRobot's."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, ClassVar
@@ -23,9 +23,9 @@ from tasks.episode import Policy
 
 EXAMPLES = DOCS.parent / "examples"
 EPISODES, STEPS = 80, 4000  # to learn from, if nothing else is said, and batches of them
+REWARDED = 1_000_000  # steps of a task to learn from by reinforcement
 SIZE, VISUALS = 64, "full"  # of pictures: their width and height (pixels), and what they show
 SHAKEN = 0.015  # rad, standard deviation of an arm's noise: as in examples/imitate.py
-MODE = "pd_joint_pos"
 
 
 @dataclass(frozen=True)
@@ -34,18 +34,22 @@ class Rung(ABC):
 
     Attributes:
         task: Id of the task.
-        episodes: Of the expert, to learn from.
-        steps: Batches to learn from.
         robots: Others than the task's, as ``--robots`` of commands names them, with commas; "" for
             none.
         seed: Of its first weights, and of its batches.
+        episodes: Of the expert, to learn from.
+        steps: Batches to learn from.
     """
 
+    FAMILY: ClassVar[str]
+    """What policies of its kind are called together."""
+    MODE: ClassVar[str] = "pd_joint_pos"
+    """What its actions mean."""
     task: str
-    episodes: int
-    steps: int
-    robots: str
-    seed: int
+    robots: str = ""
+    seed: int = 0
+    episodes: int = EPISODES
+    steps: int = STEPS
 
     @property
     @abstractmethod
@@ -54,8 +58,8 @@ class Rung(ABC):
 
     @property
     @abstractmethod
-    def policy(self) -> str:
-        """What commands call the policy."""
+    def module(self) -> str:
+        """The module whose ``policy`` plays."""
 
     @property
     @abstractmethod
@@ -87,11 +91,20 @@ class Rung(ABC):
         """Return the versions of what it was learned and played with."""
 
     @property
+    def policy(self) -> str:
+        """What commands call the policy."""
+        return f"{self.module}:policy"
+
+    @property
+    def length(self) -> str:
+        """How long it learns, in its name; "" if that is as usual."""
+        usual = (self.episodes, self.steps) == (EPISODES, STEPS)
+        return "" if usual else f"{self.episodes}x{self.steps}"
+
+    @property
     def recorded(self) -> str:
         """The name of the run that records the episodes which it learns from."""
-        usual = (self.episodes, self.steps) == (EPISODES, STEPS)
-        length = "" if usual else f"{self.episodes}x{self.steps}"
-        return "_".join(filter(None, (self.task, self.robots, self.kind, length)))
+        return "_".join(filter(None, (self.task, self.robots, self.kind, self.length)))
 
     @property
     def name(self) -> str:
@@ -112,6 +125,7 @@ class Imitation(Rung):
         pictures: Whether it learns from pictures.
     """
 
+    FAMILY: ClassVar[str] = "the examples' networks"
     pictures: bool = False
 
     @property
@@ -120,14 +134,9 @@ class Imitation(Rung):
         return "pictures" if self.pictures else ""
 
     @property
-    def example(self) -> str:
-        """The example that trains it, and whose policy plays."""
+    def module(self) -> str:
+        """The example that trains it."""
         return "imitate_images" if self.pictures else "imitate"
-
-    @property
-    def policy(self) -> str:
-        """See `Rung`."""
-        return f"{self.example}:policy"
 
     @property
     def observed(self) -> Sequence[Any]:
@@ -142,13 +151,11 @@ class Imitation(Rung):
 
     def variables(self, file: Path) -> Mapping[str, str]:
         """See `Rung`."""
-        return {f"{self.example.upper()}_POLICY": str(file)}
+        return {f"{self.module.upper()}_POLICY": str(file)}
 
     def load(self, file: Path) -> tuple[Policy, Mapping[str, Any]]:
         """See `Rung`."""
-        if str(EXAMPLES) not in sys.path:
-            sys.path.append(str(EXAMPLES))
-        example = importlib.import_module(self.example)
+        example = imported(self.module)
         policy = (example.SeeingPolicy if self.pictures else example.ClonedPolicy).load(file)
         return policy, policy.making
 
@@ -166,7 +173,7 @@ class Imitation(Rung):
             words["recording"] = runs / self.recorded / "recording"
         told = [word for name, value in words.items() for word in (f"--{name}", value)]
         folder = runs / self.name
-        run(EXAMPLES / f"{self.example}.py", self.task, *told, "--out", folder)
+        run(EXAMPLES / f"{self.module}.py", self.task, *told, "--out", folder)
         # the example ends with 1 if it learned little
         recipe: Record = read_record(folder / "learning_curve.json", recipe={})["recipe"]
         if not recipe:
@@ -186,6 +193,7 @@ class LeRobot(Rung):
         learner: One of `LEARNERS`.
     """
 
+    FAMILY: ClassVar[str] = "LeRobot's policies"
     LEARNERS: ClassVar[Mapping[str, Mapping[str, Any]]] = {
         "act": {
             **{"chunk_size": 8, "n_action_steps": 4, "dim_model": 128, "n_heads": 4},
@@ -208,9 +216,9 @@ class LeRobot(Rung):
         return self.learner
 
     @property
-    def policy(self) -> str:
+    def module(self) -> str:
         """See `Rung`."""
-        return "lerobot_env_robot_layouts.policies:policy"
+        return "lerobot_env_robot_layouts.policies"
 
     @property
     def observed(self) -> Sequence[Any]:
@@ -227,8 +235,8 @@ class LeRobot(Rung):
 
     def load(self, file: Path) -> tuple[Policy, Mapping[str, Any]]:
         """See `Rung`."""
-        policies = importlib.import_module("lerobot_env_robot_layouts.policies").LeRobotPolicy
-        making = {**self.others, "obs_mode": "lerobot", "control_mode": MODE}
+        policies = importlib.import_module(self.module).LeRobotPolicy
+        making = {**self.others, "obs_mode": "lerobot", "control_mode": self.MODE}
         return policies.load(file, self.task), making
 
     def learn(self, runs: Path) -> Record:
@@ -244,7 +252,7 @@ class LeRobot(Rung):
             data.mkdir(parents=True, exist_ok=True)
             self.shaking().save(noise := data / "shaking.yaml")
             words: list[Any] = ["--task", self.task, "--episodes", self.episodes, "--workers", 0]
-            words += ["--control-mode", MODE, "--randomization", noise]
+            words += ["--control-mode", self.MODE, "--randomization", noise]
             words += ["--robots", *self.robots.split(",")] if self.robots else []
             recording = data / "recording"
             run("-m", "robot_layouts", "record", *words, "--out", recording)
@@ -257,7 +265,7 @@ class LeRobot(Rung):
                 **{"output_dir": runs / self.name, "policy.type": self.learner, "seed": self.seed},
                 **{f"policy.{name}": value for name, value in self.LEARNERS[self.learner].items()},
                 **{"policy.device": "cpu", "policy.push_to_hub": "false", "wandb.enable": "false"},
-                **{"num_workers": 0, "env_eval_freq": 0, "save_freq": self.steps},
+                **{"num_workers": 2, "env_eval_freq": 0, "save_freq": self.steps},
                 **{"batch_size": self.BATCH, "steps": self.steps},
             }
             run("-m", "lerobot.scripts.lerobot_train", *(f"--{k}={v}" for k, v in told.items()))
@@ -277,6 +285,87 @@ class LeRobot(Rung):
     def versions(self) -> dict[str, str]:
         """See `Rung`."""
         return versions_of("lerobot", "torch", "numpy", "sapien")
+
+
+@dataclass(frozen=True)
+class Reinforced(Rung):
+    """A policy that ``examples/ppo_two_arms.py`` or ``mappo_two_arms.py`` learns from the reward.
+
+    Attributes:
+        episodes: None.
+        steps: Of the task, to learn from.
+        learner: ``ppo`` or ``mappo``.
+    """
+
+    LIBRARIES: ClassVar[Mapping[str, str]] = {"ppo": "stable-baselines3", "mappo": "torchrl"}
+    """By learner the package that does the learning."""
+    FAMILY: ClassVar[str] = "PPO and MAPPO"
+    MODE: ClassVar[str] = "pd_ee_delta_pos"
+    episodes: int = 0
+    steps: int = REWARDED
+    learner: str = "ppo"
+
+    @property
+    def kind(self) -> str:
+        """See `Rung`."""
+        return self.learner
+
+    @property
+    def length(self) -> str:
+        """See `Rung`."""
+        return "" if self.steps == REWARDED else str(self.steps)
+
+    @property
+    def module(self) -> str:
+        """The example that trains it."""
+        return f"{self.learner}_two_arms"
+
+    @property
+    def observed(self) -> Sequence[Any]:
+        """See `Rung`."""
+        return "--obs-mode", "state"
+
+    def file(self, runs: Path) -> Path:
+        """See `Rung`."""
+        return runs / self.name
+
+    def variables(self, file: Path) -> Mapping[str, str]:
+        """See `Rung`."""
+        return {f"{self.learner.upper()}_RUN": str(file)}
+
+    def load(self, file: Path) -> tuple[Policy, Mapping[str, Any]]:
+        """See `Rung`."""
+        policy = replace(imported(self.module).policy, folder=file)
+        return policy, {**self.others, "obs_mode": "state", "control_mode": self.MODE}
+
+    def learn(self, runs: Path) -> Record:
+        """See `Rung`."""
+        if find_spec(self.LIBRARIES[self.learner].replace("-", "_")) is None:
+            raise RecordError(
+                f"{self.learner} learns with {self.LIBRARIES[self.learner]}, which is not installed"
+                " here; docs/tutorials/reinforcement.md says how to install it"
+            )
+        told: list[Any] = ["--task", self.task, "--steps", self.steps, "--seed", self.seed]
+        told += ["--every", 10, "--workers", 0]
+        told += ["--robots", self.robots] if self.robots else []
+        folder = self.file(runs)
+        run(EXAMPLES / f"{self.module}.py", *told, "--out", folder)
+        # the example ends with 1 if it learned little
+        if not (folder / "curve.json").exists():
+            raise RecordError(f"{self.name} was not learned; what the example printed stands above")
+        named = {"task": self.task, "robots": self.robots, "seed": self.seed}
+        return {**named, "episodes": 0, "steps": self.steps, "policy": self.learner}
+
+    def versions(self) -> dict[str, str]:
+        """See `Rung`."""
+        return versions_of("numpy", "torch", "sapien", self.LIBRARIES[self.learner])
+
+
+def imported(example: str) -> Any:
+    """Return the module of an example."""
+    if str(EXAMPLES) not in sys.path:
+        sys.path.append(str(EXAMPLES))
+    return importlib.import_module(example)
 
 
 def run(*words: Any, **variables: str) -> int:

@@ -29,6 +29,7 @@ from robot_layouts.core.writing import PARTIAL, remove, write_whole, written_who
 from robot_layouts.data import evaluate
 from robot_layouts.data.log import HOW, Log, opened_log
 from robots import RobotLayoutsError, TaskError
+from tasks.cell_options import chosen_robots
 from tasks.episode import Policy
 
 TEST_SEED = 1_000_000  # of the first test episode; the others follow
@@ -180,6 +181,12 @@ def checkpoint_of(folder: Path) -> Path:
     return kept[-1]
 
 
+def making_of(options: argparse.Namespace, control_mode: str) -> dict[str, Any]:
+    """Return the arguments of `tasks.make` that options choose."""
+    robots = {"robots": chosen_robots(options.robots.split(","))} if options.robots else {}
+    return {"control_mode": control_mode, **robots}
+
+
 def first_seed(options: argparse.Namespace, number: int) -> int:
     """Return the seed of the first world, and of all else, at checkpoint ``number``."""
     return LEARN_SEED + options.seed * SEEDS_OF_A_RUN + number * options.envs
@@ -270,6 +277,7 @@ def read_arguments(
     add = parser.add_argument
     about = "task id; MODULE:ID for one of your own (default %(default)s)"
     add("--task", default="TwoRobotPickCube-v1", help=about)
+    add("--robots", help="others than the task's own: ROBOT for all places, or PLACE=ROBOT,…")
     add("--steps", type=int, help="steps to learn from (default: the recipe's)")
     add("--envs", type=int, default=64, help="environments to learn in (default %(default)s)")
     add("--every", type=int, help="iterations between checkpoints (default: the recipe's)")
@@ -298,7 +306,7 @@ def main(
         0 if nine of ten test episodes succeed at the end, else 1.
     """
     run = Run(options.out)
-    words = ("task", "steps", "envs", "threads", "seed")
+    words = ("task", "robots", "steps", "envs", "threads", "seed")
     try:
         run.settle(
             {

@@ -36,6 +36,7 @@ from learning_runs import (
     Learner,
     first_seed,
     main,
+    making_of,
     read_arguments,
 )
 from numpy.typing import NDArray
@@ -208,7 +209,7 @@ class MAPPOLearner(Learner):
 
     def __init__(self, recipe: Recipe, options: Namespace) -> None:
         """Make the environments to learn in."""
-        self.task, self.making = options.task, {"control_mode": recipe.control_mode}
+        self.task, self.making = options.task, making_of(options, recipe.control_mode)
         self._recipe, self._options = recipe, options
         self._arms = Arms(options.task, options.envs, options.workers, **self.making)
         self._episode = options.envs * get_task_class(options.task).max_episode_steps

@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from learning_runs import LearnedPolicy, Learner, first_seed, main, read_arguments
+from learning_runs import LearnedPolicy, Learner, first_seed, main, making_of, read_arguments
 from numpy.typing import NDArray
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
@@ -89,7 +89,7 @@ class PPOLearner(Learner):
 
     def __init__(self, recipe: Recipe, options: Namespace) -> None:
         """Make the environments to learn in."""
-        self.task, self.making = options.task, {"control_mode": recipe.control_mode}
+        self.task, self.making = options.task, making_of(options, recipe.control_mode)
         self._recipe, self._options = recipe, options
         self._env = tasks.sb3_vec_env(
             options.task, options.envs, options.workers, ignore_terminations=True, **self.making

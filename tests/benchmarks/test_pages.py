@@ -18,6 +18,7 @@ from benchmarks.placing import CELLS, targets_of
 from benchmarks.processors import PORTABLE
 from benchmarks.records import DOCS, RecordError, as_text, read_record, render, write_record
 from benchmarks.robots.judge import EXPECTED, expected_of, read_expectations
+from benchmarks.rungs import Imitation, LeRobot, Reinforced
 from benchmarks.skills import robot_of
 from objects import ObjectRegistry
 from objects.registry import CATALOGUE
@@ -171,6 +172,15 @@ def test_jaws_that_swing_hold_a_bar_firmly_before_they_lift_it():
         assert play(task, 0, lift_bar(task, 0)).solved
 
 
+def module_of(recipe):
+    """Return which module plays what a rung of the ladder has learned."""
+    learner = recipe.get("policy", "pictures" if "size" in recipe else "")
+    if learner in Reinforced.LIBRARIES:
+        return f"{learner}_two_arms"
+    examples = {"": "imitate", "pictures": "imitate_images"}
+    return examples.get(learner, "lerobot_env_robot_layouts.policies")
+
+
 def test_what_the_page_of_the_ladder_promises():
     seen = record("ladder")["tasks"]
     assert sum(len(one["arms"]) >= 3 for one in seen.values()) >= 4
@@ -186,21 +196,34 @@ def test_what_the_page_of_the_ladder_promises():
             assert (found["steps"], found["stage_score"]) == (result.length, result.stage_score)
             assert {*found["touching"]} <= {*tested}
             assert bool(receipt.making["randomization"]) == (name != OWN)
-            example = "imitate_images" if "size" in recipe else "imitate"
-            module = "lerobot_env_robot_layouts.policies" if "policy" in recipe else example
-            assert receipt.policy["name"] == f"{module}:policy"
+            assert receipt.policy["name"] == f"{module_of(recipe)}:policy"
             assert receipt.policy["files"]
             assert receipt.task == describe_task(get_task_class(recipe["task"]))
             robots = [place["robot"] for place in receipt.making["layout"].values()]
             assert robots == one["arms"]
 
 
-@pytest.mark.skipif(find_spec("lerobot") is not None, reason="LeRobot is installed")
-def test_the_ladder_says_that_it_lacks_lerobot(tmp_path, capsys):
-    words = ["--learner", "act", "--tasks", "CellCloseDrawers-v1"]
+@pytest.mark.parametrize(
+    ("learner", "package", "error"),
+    [
+        ("act", "lerobot", "act is trained by LeRobot, which is not installed"),
+        ("mappo", "torchrl", "mappo learns with torchrl, which is not installed"),
+    ],
+)
+def test_the_ladder_says_what_it_lacks(learner, package, error, tmp_path, capsys):
+    if find_spec(package) is not None:
+        pytest.skip(f"{package} is installed")
+    words = ["--learner", learner, "--tasks", "CellCloseDrawers-v1"]
     assert main(["ladder", *words, "--runs", str(tmp_path), "--out", str(tmp_path / "l.json")]) == 2
-    assert "error: act is trained by LeRobot, which is not installed" in capsys.readouterr().err
+    assert f"error: {error}" in capsys.readouterr().err
     assert not [*tmp_path.iterdir()]
+
+
+def test_runs_of_the_ladder_are_named_by_what_sets_them_apart():
+    assert Reinforced("A").name == "A_ppo"
+    assert Reinforced("A", "xarm7", 1, steps=10, learner="mappo").name == "A_xarm7_mappo_10_seed1"
+    assert Imitation("A", episodes=10, pictures=True).name == "A_pictures_10x4000"
+    assert LeRobot("A", learner="diffusion").name == "A_diffusion"
 
 
 def test_nothing_portable_differs():
