@@ -284,7 +284,7 @@ class LeRobot(Rung):
 
     def versions(self) -> dict[str, str]:
         """See `Rung`."""
-        return versions_of("lerobot", "torch", "numpy", "sapien")
+        return versions_of("lerobot", "diffusers", "torch", "numpy", "sapien")
 
 
 @dataclass(frozen=True)
