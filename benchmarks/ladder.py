@@ -113,13 +113,15 @@ def ladder(
                 seen["layouts"][name] = _played(rung, file, shift, tests, receipt)
                 record["versions"][rung.FAMILY] = rung.versions()
                 write_record(out, record)
+    # runs that differ in their seed alone follow each other
+    rows = sorted(record["tasks"].items(), key=lambda run: run[0].partition("_seed"))
     write_page(
         out,
         "ladder",
         versions=record["versions"],
         table=table(
             COLUMNS,
-            [row for _, seen in sorted(record["tasks"].items()) for row in _rows(seen)],
+            [row for _, seen in rows for row in _rows(seen)],
             range(4, len(COLUMNS)),
         ),
         recipe={"episodes": EPISODES, "steps": STEPS},
