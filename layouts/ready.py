@@ -156,9 +156,7 @@ def stooped(placement: Placement) -> Placement:
     path = tree.path(find_tcp(robot, tree).turned)
     drivers = [tree.coordinates[at] if at != FIXED else "" for at in tree.drivers]
     aiming, qpos = aiming_joints(robot, robot), np.array(placement.start_qpos)
-    shoulder = next((link for link in path if drivers[link] in aiming), None)
-    if shoulder is None:
-        return placement
+    shoulder = next((link for link in path if drivers[link] in aiming), 0)
     for joint in (drivers[link] for link in path if tree.slides[link]):
         if joint not in robot.arm_joints or joint in aiming:
             continue
@@ -171,11 +169,23 @@ def stooped(placement: Placement) -> Placement:
         qpos = rows[np.argmin(off.round(3))]
     if not np.array_equal(qpos, placement.start_qpos):
         placement = replace(placement, keyframe=None, qpos=qpos.tolist())
-    height = float(tree.forward(qpos[None])[0, shoulder, 2, 3])
-    if height <= TALL * robot.reach or len(aiming) <= FINGER or robot.limbs or placement.on:
+    if placement.on or not (height := _too_high(placement)):
         return placement
     x, y, z = placement.local_pose.position
     return replace(placement, position=(x, y, round(z + SHOULDER * robot.reach - height, 3)))
+
+
+def _too_high(placement: Placement) -> float:
+    """Return how high above its base an arm begins that cannot work down there (m); 0 if it can."""
+    robot, tree = placement.robot, link_tree(placement.robot)
+    aiming = aiming_joints(robot, robot)
+    if len(aiming) <= FINGER or robot.limbs:
+        return 0.0
+    path = tree.path(find_tcp(robot, tree).turned)
+    driven = tree.drivers[[*path]]
+    first = next(i for i, at in enumerate(driven) if at != FIXED and tree.coordinates[at] in aiming)
+    height = float(tree.forward(np.array([placement.start_qpos]))[0, path[first], 2, 3])
+    return height if height > TALL * robot.reach else 0.0
 
 
 def lift(placement: Placement) -> float:
@@ -234,10 +244,10 @@ def off_the_table(
 
 
 def before_robots(table: Rectangle, layout: Layout) -> Rectangle:
-    """Return the outline of a table that ends before robots whose bases are lower than its top.
+    """Return the outline of a table that ends before robots of high shoulders that stand lower.
 
     It is cut along one side for each of them that would stand in it: where all other robots stay
-    on it, if there is such a side, and where most of it is left.
+    on it, if there is such a side, and where most of it is left. Other robots in it stay in it.
 
     Args:
         table: Its outline, if none were lower; its top is at z = 0: x_min, y_min, x_max, y_max (m).
@@ -246,7 +256,7 @@ def before_robots(table: Rectangle, layout: Layout) -> Rectangle:
     Raises:
         AssetError: If the files of robots that are lower cannot be found.
     """
-    lower = [placement for placement in layout.values() if placement.base_position[2] < 0]
+    lower = [at for at in layout.values() if at.base_position[2] < 0 and _too_high(at)]
     others = [at.base_position for at in layout.values() if at not in lower]
     for placement in lower:
         corners = standing_corners(placement)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -73,6 +74,27 @@ def quaternion_of(rotation: ArrayLike) -> Floats:
     return np.where(unit[..., :1] < 0, -unit, unit)
 
 
+def _quaternion_of_one(matrix: Sequence[float]) -> tuple[float, float, float, float]:
+    """Return what `quaternion_of` does, to the last bit, of one matrix in rows, (9,)."""
+    xx, m01, m02, m10, yy, m12, m20, m21, zz = matrix
+    trace = xx + yy + zz
+    x, y, z = m21 - m12, m02 - m20, m10 - m01
+    xy, xz, yz = m01 + m10, m02 + m20, m12 + m21
+    largest = max(trace, xx, yy, zz)
+    if largest == trace:
+        w, x, y, z = 1 + trace, x, y, z
+    elif largest == xx:
+        w, x, y, z = x, 1 - trace + 2 * xx, xy, xz
+    elif largest == yy:
+        w, x, y, z = y, xy, 1 - trace + 2 * yy, yz
+    else:
+        w, x, y, z = z, xz, yz, 1 - trace + 2 * zz
+    length = sqrt(x * x + y * y + z * z + w * w)
+    if w < 0:
+        length = -length
+    return w / length, x / length, y / length, z / length
+
+
 def rotation_of(quaternion: ArrayLike) -> Floats:
     """Return the rotation matrices of quaternions, (…, 3, 3)."""
     array = np.asarray(quaternion, float)
@@ -115,7 +137,12 @@ def cross(first: Floats, second: Floats) -> Floats:
 
 def rotation_vector(rotation: ArrayLike) -> Floats:
     """Return axis times angle of rotation matrices, the angle in [0, π], (…, 3) (rad)."""
-    quaternion = quaternion_of(rotation)
+    matrices = np.asarray(rotation, float)
+    if matrices.size == 9:  # numbers are quicker than arrays
+        quaternion = np.array(_quaternion_of_one(matrices.reshape(9).tolist()))
+        quaternion = quaternion.reshape(*matrices.shape[:-2], 4)
+    else:
+        quaternion = quaternion_of(matrices)
     w, axis = quaternion[..., :1], quaternion[..., 1:]
     angle = 2 * np.arctan2(np.linalg.norm(axis, axis=-1, keepdims=True), w)
     small = angle <= _SMALL_ANGLE

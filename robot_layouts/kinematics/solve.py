@@ -122,7 +122,7 @@ def shortfalls(tree: Tree, goal: IkGoal, qpos: Floats) -> tuple[Floats, Floats]:
         goal: What is asked for.
         qpos: Coordinates, (n, coordinates) (rad, m).
     """
-    errors, _ = _errors(tree, goal, qpos, ())
+    errors = _missing(goal, tree.forward(qpos))
     return np.linalg.norm(errors[:, :3], axis=1), np.linalg.norm(errors[:, 3:], axis=1)
 
 
@@ -161,11 +161,13 @@ def approach(
         at = rows[0, free]
         # A joint at a limit that it is drawn beyond leaves the way to the others: of the two ways,
         # each asks for itself, so that the second never hinders the first.
-        way, _ = _by_priority(errors[0], slopes[0], rest - at)
-        kept = _inward(way, at, low, high)
-        way, aside = _by_priority(errors[0], slopes[0] * kept, rest - at)
-        kept = kept & _inward(aside, at, low, high)
-        _, aside = _by_priority(errors[0], slopes[0] * kept, rest - at)
+        way, aside = _by_priority(errors[0], slopes[0], rest - at)
+        free_to_go = _inward(way, at, low, high)
+        if not free_to_go.all():
+            way, aside = _by_priority(errors[0], slopes[0] * free_to_go, rest - at)
+        kept = free_to_go & _inward(aside, at, low, high)
+        if (kept != free_to_go).any():
+            _, aside = _by_priority(errors[0], slopes[0] * kept, rest - at)
         at, aside = np.clip(at + way, low, high), aside * kept
         at = at + _share(aside, at, low, high) * aside
         rows[0, free] = np.clip(at, low, high)
@@ -233,7 +235,6 @@ def _solved(
 def _errors(tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int]) -> tuple[Floats, Floats]:
     """Return what is missing to the goal, (n, 3 or 6), and its slopes by the free coordinates."""
     poses = tree.forward(qpos)
-    place = poses[:, goal.links][..., :3, 3].mean(axis=1)
     moving = {link: tree.jacobian(poses, link, free) for link in {*goal.links, goal.turned}}
     slopes = np.zeros((len(qpos), 3, len(free)))
     for link in goal.links:
@@ -241,14 +242,21 @@ def _errors(tree: Tree, goal: IkGoal, qpos: Floats, free: Sequence[int]) -> tupl
     if goal.offset is not None:
         beside = poses[:, goal.turned, :3, :3] @ goal.offset
         aside = cross(moving[goal.turned][:, 3:].transpose(0, 2, 1), beside[:, None])
-        place, slopes = place + beside, slopes + aside.transpose(0, 2, 1)
+        slopes = slopes + aside.transpose(0, 2, 1)
+    if goal.rotation is not None:
+        slopes = np.concatenate([slopes, moving[goal.turned][:, 3:]], axis=1)
+    return _missing(goal, poses), slopes
+
+
+def _missing(goal: IkGoal, poses: Floats) -> Floats:
+    """Return what is missing to the goal where all links are, (n, 3 or 6)."""
+    place = poses[:, goal.links][..., :3, 3].mean(axis=1)
+    if goal.offset is not None:
+        place = place + poses[:, goal.turned, :3, :3] @ goal.offset
     if goal.rotation is None:
-        return goal.position - place, slopes
+        return goal.position - place
     turn = rotation_vector(goal.rotation @ poses[:, goal.turned, :3, :3].transpose(0, 2, 1))
-    return (
-        np.concatenate([goal.position - place, turn], axis=1),
-        np.concatenate([slopes, moving[goal.turned][:, 3:]], axis=1),
-    )
+    return np.concatenate([goal.position - place, turn], axis=1)
 
 
 def scattered(limits: Floats, count: int) -> Floats:

@@ -170,8 +170,8 @@ def wide_table_outline(
 
 
 def before_robots(outline: Rectangle, layout: Layout) -> Rectangle:
-    """Return the outline of a table that ends before robots whose bases are lower than its top."""
-    if all(placement.base_position[2] >= 0 for placement in layout.values()):
+    """Return the outline of a table that ends before robots of high shoulders that stand lower."""
+    if not [at for at in layout.values() if at.position and at.position[2] < 0]:
         return outline
     from layouts.ready import before_robots as cut
 
