@@ -97,6 +97,10 @@ def ladder(
     torch.set_num_threads(1)
     record = read_record(out, versions={}, tasks={})
     receipts = out.parent / "receipts" / "ladder"
+    if pictures and learner != "imitation":
+        raise RecordError(f"--pictures goes with --learner imitation, and not with {learner}")
+    if episodes is not None and learner in Reinforced.LIBRARIES:
+        raise RecordError(f"{learner} learns from no expert's episodes; --steps says how long")
     sizes = {"episodes": episodes, "steps": steps}
     told = {"robots": robots, **{name: size for name, size in sizes.items() if size is not None}}
     for task, seed in product(tasks, seeds):

@@ -19,7 +19,6 @@ from layouts.shared_place import (
     drawn_postures,
     inside_table,
     places_and_approaches,
-    standing_corners,
 )
 from layouts.validation.collisions import moving_hulls, noisy_postures
 from robot_layouts.kinematics.quaternions import forward
@@ -27,7 +26,7 @@ from robot_layouts.kinematics.rotations import Floats, inverse_pose, pose_matrix
 from robot_layouts.kinematics.solve import IkGoal, shortfalls, solve
 from robot_layouts.kinematics.tree import FIXED, Tree
 from robots.bodies.hulls import load_model
-from robots.descriptor import Vector3
+from robots.descriptor import RobotDescriptor, Vector3
 from robots.gripper_motion import aiming_joints, gripper_frame, link_tree
 from robots.urdf.tcp import find_tcp
 
@@ -156,7 +155,7 @@ def stooped(placement: Placement) -> Placement:
     path = tree.path(find_tcp(robot, tree).turned)
     drivers = [tree.coordinates[at] if at != FIXED else "" for at in tree.drivers]
     aiming, qpos = aiming_joints(robot, robot), np.array(placement.start_qpos)
-    shoulder = next((link for link in path if drivers[link] in aiming), 0)
+    shoulder = _shoulder(robot, tree)
     for joint in (drivers[link] for link in path if tree.slides[link]):
         if joint not in robot.arm_joints or joint in aiming:
             continue
@@ -178,14 +177,19 @@ def stooped(placement: Placement) -> Placement:
 def _too_high(placement: Placement) -> float:
     """Return how high above its base an arm begins that cannot work down there (m); 0 if it can."""
     robot, tree = placement.robot, link_tree(placement.robot)
-    aiming = aiming_joints(robot, robot)
-    if len(aiming) <= FINGER or robot.limbs:
+    if len(aiming_joints(robot, robot)) <= FINGER or robot.limbs:
         return 0.0
-    path = tree.path(find_tcp(robot, tree).turned)
-    driven = tree.drivers[[*path]]
-    first = next(i for i, at in enumerate(driven) if at != FIXED and tree.coordinates[at] in aiming)
-    height = float(tree.forward(np.array([placement.start_qpos]))[0, path[first], 2, 3])
+    poses = tree.forward(np.array([placement.start_qpos]))
+    height = float(poses[0, _shoulder(robot, tree), 2, 3])
     return height if height > TALL * robot.reach else 0.0
+
+
+def _shoulder(robot: RobotDescriptor, tree: Tree) -> int:
+    """Return the first link that is moved by a joint which aims the arm; the root if none is."""
+    aiming = aiming_joints(robot, robot)
+    path = tree.path(find_tcp(robot, tree).turned)
+    driven = ((link, tree.drivers[link]) for link in path)
+    return next((link for link, at in driven if at != FIXED and tree.coordinates[at] in aiming), 0)
 
 
 def lift(placement: Placement) -> float:
@@ -259,7 +263,7 @@ def before_robots(table: Rectangle, layout: Layout) -> Rectangle:
     lower = [at for at in layout.values() if at.base_position[2] < 0 and _too_high(at)]
     others = [at.base_position for at in layout.values() if at not in lower]
     for placement in lower:
-        corners = standing_corners(placement)
+        corners = body_corners(placement)
         inside = corners[inside_table(corners, table)]
         if not inside.size:
             continue
@@ -274,7 +278,8 @@ def before_robots(table: Rectangle, layout: Layout) -> Rectangle:
             (x_min, y_min, x_max, low_y),
             (x_min, high_y, x_max, y_max),
         ]
-        table = max(rests, key=lambda rest: (_kept(rest, others), _area(rest)))
+        rest = max(rests, key=lambda rest: (_kept(rest, others), _area(rest)))
+        table = rest if _area(rest) else table  # a robot that fills it is in its way
     x_min, y_min, x_max, y_max = map(float, table)
     return x_min, y_min, x_max, y_max
 

@@ -239,21 +239,10 @@ def _carried(tree: Tree, robot: RobotDescriptor, part: RobotDescriptor) -> froze
 
 
 def body_corners(placement: Placement) -> Floats:
-    """Return the corners of a robot's hulls that no limb carries, (n, 3) (m, world)."""
-    robot = placement.robot
-    return _corners(placement, [robot.parts[limb] for limb in robot.limbs])
-
-
-def standing_corners(placement: Placement) -> Floats:
-    """Return the corners of a robot's hulls that no arm carries, (n, 3) (m, world)."""
-    robot = placement.robot
-    return _corners(placement, [robot.parts[limb] for limb in robot.limbs] or [robot])
-
-
-def _corners(placement: Placement, parts: Iterable[RobotDescriptor]) -> Floats:
-    """Return the corners of a robot's hulls that none of its parts carries, (n, 3) (m, world)."""
+    """Return the corners of a robot's hulls that no arm or limb carries, (n, 3) (m, world)."""
     model, robot = load_model(placement.robot), placement.robot
-    limbs = [_carried(model.kinematics, robot, part) for part in parts]
+    arms = [robot.parts[limb] for limb in robot.limbs] or [robot]
+    limbs = [_carried(model.kinematics, robot, arm) for arm in arms]
     base = pose_matrix(placement.base_position, placement.base_quaternion)
     poses = base @ model.kinematics.forward(np.array([placement.start_qpos]))[0]
     body = [hull for hull in model.hulls if not any(hull.link in links for links in limbs)]

@@ -219,6 +219,19 @@ def test_the_ladder_says_what_it_lacks(learner, package, error, tmp_path, capsys
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (["--learner", "ppo", "--pictures"], "--pictures goes with --learner imitation"),
+        (["--learner", "mappo", "--episodes", "9"], "mappo learns from no expert's episodes"),
+    ],
+)
+def test_the_ladder_refuses_what_a_learner_does_not_take(words, error, tmp_path, capsys):
+    assert main(["ladder", *words, "--out", str(tmp_path / "l.json")]) == 2
+    assert error in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]
+
+
 def test_runs_of_the_ladder_are_named_by_what_sets_them_apart():
     assert Reinforced("A").name == "A_ppo"
     assert Reinforced("A", "xarm7", 1, steps=10, learner="mappo").name == "A_xarm7_mappo_10_seed1"
