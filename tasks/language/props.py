@@ -203,7 +203,8 @@ def add_kitchen_counter(world: World, scale: float = 1.0) -> None:
 def add_wide_table(world: World, others: Sequence[tuple[float, float]] = ()) -> None:
     """Add a table under all robots of a layout, its top at z = 0, and the floor below it.
 
-    It ends `TABLE_MARGIN` beyond the outermost bases, and before those that are lower than its top.
+    It ends `TABLE_MARGIN` beyond the outermost bases, and before robots of high shoulders that
+    stand lower.
 
     Args:
         world: The world; its layout says where the bases are.

@@ -104,3 +104,16 @@ def test_roll_pitch_and_yaw_come_back(roll, pitch, yaw):
     assert_same_turn(np.array(quaternion), wxyz(expected))
     again = quaternions.rpy_quaternion(quaternions.quaternion_rpy(quaternion))
     assert_same_turn(np.array(again), np.array(quaternion))
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-5, 1.0])
+@pytest.mark.parametrize("part", range(5))
+def test_a_rotation_alone_has_the_vector_that_it_has_among_others(size, part):
+    """To the last bit, whichever component of its quaternion is the largest, if one is."""
+    drawn = np.random.default_rng(part).normal(size=(200, 4))
+    drawn[:, [i for i in range(4) if i != part]] *= size
+    turns = rotations.rotation_of(drawn / np.linalg.norm(drawn, axis=1, keepdims=True))
+    together = rotations.rotation_vector(turns)
+    for one, expected in zip(turns, together, strict=True):
+        np.testing.assert_array_equal(rotations.rotation_vector(one), expected)
+        np.testing.assert_array_equal(rotations.rotation_vector(one[None])[0], expected)
