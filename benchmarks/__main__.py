@@ -7,6 +7,7 @@ from benchmarks.bench.run import bench, tables
 from benchmarks.cells import cells
 from benchmarks.collisions import collisions
 from benchmarks.conversions import conversions
+from benchmarks.datasets import datasets
 from benchmarks.device import device
 from benchmarks.engines import engines
 from benchmarks.experts import experts
@@ -46,6 +47,7 @@ PROGRAM = Program(
             placing,
             packaged,
             objects,
+            datasets,
             engines,
             device,
             agreement,

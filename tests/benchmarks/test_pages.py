@@ -36,6 +36,7 @@ COMMANDS = {
     "objects": ["objects", "--objects", "mug"],  # which needs no package
     "experts": ["experts", "--tasks", "--pair-seeds", "0"],
     "cells_robots": ["cells", "--tasks"],
+    "datasets": ["datasets", "--tasks"],
     "engines": ["engines", "--tasks"],
     "device": ["agreement", "--tasks"],
     "conversions": ["conversions", "--modes", "--tasks", "PickCube-v1"],
