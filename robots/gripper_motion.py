@@ -99,7 +99,7 @@ class GripperMotion:
         if self.angles.max() < _SLIDES:
             apart = np.maximum(apart - _inside(shapes, one - other), 0)
         self.openings = apart
-        wrist = transform(hand[0], poses[0, wrist_of(robot, tree), :3, 3])
+        wrist = transform(hand[0], poses[0, _wrist_of(robot, tree), :3, 3])
         self.turn = _axes(self._middles[0] - wrist, (one - other)[_AJAR])
         ahead = [(corners - self._middles[0]) @ self.turn[:, 2] for corners in shapes]
         self.beyond = max((float(along.max()) for along in ahead), default=0.0)
@@ -281,7 +281,17 @@ def gripper_frame(robot: RobotDescriptor) -> Floats:
         return np.eye(3)
 
 
-def wrist_of(robot: RobotDescriptor, tree: Tree) -> int:
+def hand_links(robot: RobotDescriptor, tree: Tree) -> frozenset[str]:
+    """Return the names of a tree's links that the last joint of the arm moves, its gripper's too.
+
+    Raises:
+        AssetError: If its files cannot be found.
+    """
+    wrist = _wrist_of(robot, tree)
+    return frozenset(link for i, link in enumerate(tree.links) if wrist in tree.path(i))
+
+
+def _wrist_of(robot: RobotDescriptor, tree: Tree) -> int:
     """Return the link that the last joint of the arm moves."""
     arm = [joint.child for joint in _model(robot).ordered if joint.name in robot.arm_joints]
     return max(map(tree.link, arm), key=lambda at: len(tree.path(at)), default=0)

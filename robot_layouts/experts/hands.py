@@ -19,7 +19,7 @@ from robot_layouts.kinematics.rotations import (
 )
 from robot_layouts.kinematics.solve import IkGoal, scattered, shortfalls, solve
 from robots.action_split import is_gripper
-from robots.gripper_motion import aiming_joints, gripper_motion, link_tree, wrist_of
+from robots.gripper_motion import aiming_joints, gripper_motion, hand_links, link_tree
 from robots.urdf.tcp import find_tcp
 from tasks import TaskEnv
 
@@ -94,8 +94,7 @@ class Hand:
         pose = layout[self.owner].base_pose
         self.base = pose_matrix(pose.position, pose.quaternion)
         whole = link_tree(robot)
-        wrist = wrist_of(own, whole)
-        self.links = {link for i, link in enumerate(whole.links) if wrist in whole.path(i)}
+        self.links = hand_links(own, whole)
         self._tree = whole.towards(find_tcp(own, whole).needed)
         self._tcp = find_tcp(own, self._tree)
         self._aiming = [robot.joints.index(joint) for joint in aiming_joints(robot, own)]

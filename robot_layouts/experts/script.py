@@ -15,7 +15,7 @@ from robot_layouts.experts.grips import Grip, role_grip
 from robot_layouts.kinematics.rotations import Floats, multiply, quaternion_of, rotate
 from robot_layouts.simulation import State
 from robot_layouts.simulation.world import WorldBody
-from robots.gripper_motion import gripper_turn
+from robots.gripper_motion import gripper_turn, hand_links, link_tree
 from tasks import TaskEnv
 
 OPEN, CLOSED = 1.0, -1.0
@@ -96,6 +96,17 @@ class Scene:
     def grasps(self, robot: str, body: str) -> bool:
         """Return whether a robot's fingers hold a body."""
         return bool(self._state.is_grasping(robot, body)[0])
+
+    def touches(self, robot: str, body: str) -> bool:
+        """Return whether a robot's hand touches a body, with its tip or with what surrounds that.
+
+        Args:
+            robot: An arm: what its last joint moves is its hand, the gripper included.
+            body: The body.
+        """
+        arm, owner = self._layout.arm(robot).robot, self._layout.owner(robot)
+        links = hand_links(arm, link_tree(self._layout[owner].robot))
+        return any(self._state.contact_force(owner, link, body).any() for link in links)
 
     def pressure(self, robot: str, body: str) -> float:
         """Return the force with which a robot's fingers press on a body, the lesser of two (N).

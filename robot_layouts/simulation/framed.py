@@ -115,7 +115,7 @@ class FramedState(State):
     Forces are turned into the frame, and as strong as they are (N). Robots' joints are theirs.
     """
 
-    __slots__ = ()
+    __slots__ = ("_scale",)
 
     def __init__(self, state: State, fit: Fit, bodies: Mapping[str, WorldBody]) -> None:
         """Take a state of the world.
@@ -125,12 +125,18 @@ class FramedState(State):
             fit: Where the frame lies, and how large it is.
             bodies: The bodies of a world, by name.
         """
+        self._scale = fit.scale
         moment = _FramedMoment(state._moment, fit, bodies)
         joints = state.joint_positions, state.joint_velocities
         super().__init__(Readout(state.all_poses, *joints), state._index, moment)
         x, y, z, *turns = np.moveaxis(state.all_poses, -1, 0)
         place = moment.turned(np.stack((x - fit.x, y - fit.y, z), -1)) / np.float32(fit.scale)
         self.all_poses = np.concatenate((place, _turned_back(turns, fit.yaw)), -1, dtype=np.float32)
+
+    @property
+    def scale(self) -> float:
+        """How long 1 m of its lengths is in the world (m)."""
+        return self._scale
 
 
 class _FramedMoment(Moment):

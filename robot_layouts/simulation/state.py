@@ -117,6 +117,11 @@ class State:
         self.num_envs = len(self.joint_positions)
         self.all_poses = with_means(poses, index.mean_frames) if index.mean_frames else poses
 
+    @property
+    def scale(self) -> float:
+        """How long 1 m of its lengths is in the world (m): other than 1 in a fitted task."""
+        return 1.0
+
     def lost(self) -> Lost | None:
         """Return the first robot or body with numbers that are not finite, or None.
 

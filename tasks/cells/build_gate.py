@@ -71,7 +71,9 @@ class CellBuildGate(CellTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all parts rest in their places, let go."""
         east, west, beam, cap = (
-            (way <= NEAR) & (state.speed(part) <= SLOW) & ~state.is_grasping(arm, part)
+            (way <= NEAR)
+            & (state.speed(part) <= SLOW / state.scale)
+            & ~state.is_grasping(arm, part)
             for (arm, part), way in zip(PARTS.items(), self.ways(state), strict=True)
         )
         laid = east & west & beam

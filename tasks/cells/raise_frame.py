@@ -77,7 +77,7 @@ class CellRaiseFrame(CellTask):
             "is_one_holding": held >= 1,
             "are_all_holding": held >= len(self.arms),
             "is_high": high,
-            "success": high & level & (state.speed("frame") <= SPEED),
+            "success": high & level & (state.speed("frame") <= SPEED / state.scale),
         }
 
     def observe(self, state: State, info: Info) -> dict[str, Array]:

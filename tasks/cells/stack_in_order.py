@@ -63,7 +63,7 @@ class CellStackInOrder(CellTask):
     def evaluate(self, state: State) -> dict[str, Array]:
         """Success: all are in their places, at rest and let go."""
         held = [state.is_grasping(arm, f"cube_{arm}") for arm in self.arms]
-        slow = [state.speed(f"cube_{arm}") <= SLOW for arm in self.arms]
+        slow = [state.speed(f"cube_{arm}") <= SLOW / state.scale for arm in self.arms]
         near = [way <= NEAR for way in self.ways(state)]
         placed = self.count([n & s & ~h for n, s, h in zip(near, slow, held, strict=True)])
         return {"is_one_held": self.count(held) >= 1, **self.passed(placed, 1, 2, 3)}

@@ -116,8 +116,11 @@ def distance_to_top(state: State, top: str, bottom: str, *heights: float) -> Flo
 
 
 def is_at_rest(state: State, body: str) -> Flags:
-    """Tell whether a body is slower than 1 cm/s and 0.5 rad/s, shape (N,) bool."""
-    return (state.speed(body) <= SLOW) & (state.spin(body) <= SLOW_SPIN)
+    """Tell whether a body is slower than 1 cm/s and 0.5 rad/s, shape (N,) bool.
+
+    Those are speeds in the world, at any size of the task: what lies still keeps some mm/s there.
+    """
+    return (state.speed(body) <= SLOW / state.scale) & (state.spin(body) <= SLOW_SPIN)
 
 
 def diagonal(side: float, beyond: float = 0.0) -> float:

@@ -42,6 +42,7 @@ def test_a_hand_comes_down_on_a_bracket_as_it_has_set_off():
         ("CellTwoHandPress-v1", {"loader": "panda"}, 1),  # a flat tip, to which the block sticks
         pytest.param("CellGatherBlocks-v1", UR5_AND_Z1, 0, marks=pytest.mark.long),  # z1s lean far
         pytest.param("CellSqueezeBox-v1", "xarm7", 0, marks=pytest.mark.long),  # is wide
+        pytest.param("CellStackInOrder-v1", "so101", 0, marks=pytest.mark.long),  # small cubes rest
         pytest.param("CellSqueezeBox-v1", STICK_AND_FLANGE, 0, marks=pytest.mark.long),
     ],
 )
@@ -56,6 +57,8 @@ def test_tips_of_other_makes_push_and_press(task_id, robots, seed):
         ("CellTwoHandPress-v1", ("koch",)),  # it begins with its joints at their limits
         ("CellPressInOrder-v1", ("ur3", "fetch")),  # fingers reach below the Fetches' TCPs
         ("CellSetFaders-v1", ("so101", "fetch")),
+        ("CellTakeSides-v1", ("panda_stick", "so100")),  # a block slips off, and is pushed again
+        ("CellSqueezeBox-v1", ("xarm7", "so100")),  # tips feel where the box begins
         pytest.param("CellTurnTaps-v1", ("ur3", "ur10"), marks=pytest.mark.long),  # wide flanges
     ],
 )

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from layouts import face_to_face
+from robot_layouts.experts.script import Scene
 from robot_layouts.experts.touching import ArmWatch
 from robots import MissingPackageError
-from tasks import Randomization, get_task_class
+from tasks import Randomization, get_task_class, make
 
 HANDS = [0.0, 0.41, 0.0, -2.05, 0.0, 2.46, 0.785, 0.04, 0.04]  # in each other, 1.2 m apart
 
@@ -35,6 +36,23 @@ def test_hands_in_each_other_are_seen_in_clones_as_in_other_tasks(task_id):
     found = watch.touching()
     assert any({part.name for part in pair} == {"panda_hand"} for pair in found)
     task.close()
+
+
+def test_a_scene_says_which_hand_touches_a_body():
+    env = make("TwoRobotPickCube-v1", obs_mode="none")
+    env.reset(seed=0)
+    assert not Scene(env).touches("left", "cube")
+    world, qpos = env.simulation.worlds[0], Scene(env).qpos("left")
+    qpos[-2:] = 0.0195  # fingers that hold a cube of 4 cm
+    world.stand("left", qpos.tolist())
+    world.set_pose("cube", tuple(Scene(env).tcp("left")[0].tolist()))
+    closing = np.zeros((1, 16), np.float32)
+    closing[0, 7] = -1.0
+    env.step(closing)
+    scene = Scene(env)
+    assert scene.touches("left", "cube")
+    assert not scene.touches("right", "cube")
+    env.close()
 
 
 def test_without_what_measures_overlaps_a_strict_watch_is_refused(monkeypatch):

@@ -10,6 +10,7 @@ from layouts import at_task, face_to_face
 from robot_layouts.simulation import Box, Simulation
 from robot_layouts.simulation.framed import Fit, FramedState, FramedWorld
 from robots import SimulationError
+from tasks import is_at_rest
 from tasks.cells.sort_cubes import CUBES, HALF, NEAREST, PADS, THICK
 
 SMALL = at_task("so101", tasks.get_task_class("CellPutAway-v1"))
@@ -59,6 +60,21 @@ def test_lengths_and_speeds_are_larger_and_angles_are_not(case):
     np.testing.assert_array_equal(framed.qpos("opener"), state.qpos("opener"))
     for robot in ("opener", "packer"):
         assert framed.is_grasping(robot, "can") == state.is_grasping(robot, "can")
+
+
+def test_small_things_rest_at_the_speed_at_which_large_ones_do(case):
+    env, _, _ = case
+    bodies = env.simulation.worlds[0].bodies
+    was = env.get_state_dict()
+    for speed, rests in ((0.009, True), (0.011, False)):  # m/s; as fast the declared can is 2 cm/s
+        now = env.get_state_dict()
+        now["actors"]["can"][0, 7:] = 0.0
+        now["actors"]["can"][0, 7] = speed
+        env.set_state_dict(now)
+        framed = FramedState(env.state, env.task.fit, bodies)
+        assert framed.speed("can").item() > 0.02
+        assert is_at_rest(framed, "can").item() is rests is is_at_rest(env.state, "can").item()
+    env.set_state_dict(was)
 
 
 def test_slides_of_bodies_are_as_long_as_declared():

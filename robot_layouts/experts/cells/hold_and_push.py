@@ -11,6 +11,9 @@ from robot_layouts.kinematics.rotations import Floats
 from tasks import TaskEnv
 from tasks.cells.hold_and_push import PUSHERS, CellHoldAndPush
 
+# How deep the button is pressed (m), strokes of a push, and whether a lost block is pushed again
+TRIED = ((0.02, 12, False), (0.04, 16, False), (0.02, 16, True))
+
 
 def hold_and_push(task: TaskEnv, seed: int) -> Plan:
     """Return the actions of all arms, (T, A), that hold the button and push the blocks."""
@@ -36,11 +39,12 @@ def hold_and_push(task: TaskEnv, seed: int) -> Plan:
                         partial(mark, arm=arm),
                         strokes=strokes,
                         after=["holder.press button"],
+                        again=again,
                     )
                     for arm in PUSHERS
                 },
             }
-            for depth, strokes in ((0.02, 12), (0.04, 16))
+            for depth, strokes, again in TRIED
         ],
         as_declared=True,
     )

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
-from itertools import product
 from math import pi
 
 import numpy as np
@@ -24,8 +22,11 @@ HELD = 0.085  # m; height of the tips when they press: hands stay above the box
 LEANS = (0.15, 0.3, 0.45, 0.6)  # of tips that do not reach there upright (rad)
 LEGS, RAISED = 5, HIGH + 0.04  # in how many steps it is lifted, and how far (m)
 OVER_PLINTH = {"down 0": 0.5}  # how far of its way over the plinth the box goes; then all of it
-TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))  # how deep tips press (m), and strokes of the push
-FLANGE = 0.047  # m; so far outside stays the middle of one that is as wide as an xArm 7's
+# How deep tips press (m), and strokes of the push. Where a flange, or fingers, reach out farther
+# than the tip, that is too deep: then tips come near until they touch, and press from there on.
+TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))
+FELT = ((0.012, 28), (0.006, 28), (0.02, 36))
+GENTLE = 0.1  # share of its greatest speed at which a tip comes near
 
 
 def squeeze_box(task: TaskEnv, seed: int) -> Plan:
@@ -37,21 +38,16 @@ def squeeze_box(task: TaskEnv, seed: int) -> Plan:
     return first_success(
         task,
         seed,
-        lambda scene: [_script(task, *tried, wide) for wide in _widths(task) for tried in TRIED],
+        lambda scene: [
+            _script(task, deep, strokes, felt=felt)
+            for felt, tried in ((False, TRIED), (True, FELT))
+            for deep, strokes in tried
+        ],
         as_declared=True,
     )
 
 
-def _widths(task: TaskEnv) -> list[dict[str, float]]:
-    """Return how far outside the middle of tips without fingers may have to stay, by arm (m)."""
-    tips = [arm for arm in SIDES if task.layout.arm(arm).robot.fingers is None]
-    found = [
-        dict(zip(tips, wide, strict=True)) for wide in product((0.0, FLANGE), repeat=len(tips))
-    ]
-    return sorted(found, key=lambda wide: len({*wide.values()}))  # alike ones first
-
-
-def _script(task: TaskEnv, deep: float, strokes: int, wide: Mapping[str, float]) -> Script:
+def _script(task: TaskEnv, deep: float, strokes: int, *, felt: bool) -> Script:
     start: list[Floats] = []  # where the box stood
 
     def under(scene: Scene) -> Floats:
@@ -62,12 +58,15 @@ def _script(task: TaskEnv, deep: float, strokes: int, wide: Mapping[str, float])
     )
     return {
         "pusher": (*pushing, stand_back(task, "pusher")),
-        **{arm: _pressing(task, arm, wide.get(arm, 0.0) - deep, start) for arm in SIDES},
+        **{arm: _pressing(task, arm, deep, start, felt=felt) for arm in SIDES},
     }
 
 
-def _pressing(task: TaskEnv, arm: str, out: float, start: list[Floats]) -> tuple[Waypoint, ...]:
+def _pressing(
+    task: TaskEnv, arm: str, deep: float, start: list[Floats], *, felt: bool
+) -> tuple[Waypoint, ...]:
     (other,) = (each for each in SIDES if each != arm)
+    side = [0.0]  # how far outside the box's side its tip is when it touches that (m)
     lean = {"leans": (0.0,), "farther": LEANS}
     go = partial(reaching, task, arm, **lean, as_it_is=False, gripper=CLOSED)
 
@@ -77,9 +76,21 @@ def _pressing(task: TaskEnv, arm: str, out: float, start: list[Floats]) -> tuple
         x, y, _ = start[0] + over * (scene.body("plinth")[0] - start[0])
         return np.array([x + SIDES[arm] * (BOX[0] + out), y, HELD + up])
 
+    def touched(scene: Scene) -> Floats:
+        """Return where the tip is; from there on it presses."""
+        start[:] = [scene.body("box")[0]]
+        side[0] = SIDES[arm] * (scene.tcp(arm)[0] - start[0])[0] - BOX[0]
+        return beside(scene, side[0], 0.0)
+
+    def pressed(scene: Scene, up: float, over: float) -> Floats:
+        return beside(scene, side[0] - deep, up, over)
+
+    def touches(scene: Scene) -> bool:
+        return scene.touches(arm, "box")
+
     def step(name: str, up: float, before: str) -> Waypoint:
         over = OVER_PLINTH.get(name, float(name.startswith("down")))
-        place = partial(beside, out=out, up=up, over=over)
+        place = partial(pressed, up=up, over=over)
         after = (f"{other}.{before}", *(("pusher.away plinth",) if name == "down 0" else ()))
         return go(name, place, near=pi, steps=6, after=after)
 
@@ -87,10 +98,16 @@ def _pressing(task: TaskEnv, arm: str, out: float, start: list[Floats]) -> tuple
     downs = [RAISED + (2 * PLINTH[2] - RAISED) * (leg + 1) / LEGS for leg in range(LEGS)]
     steps = {"squeeze": 0.0} | {f"up {i}": up for i, up in enumerate(ups)}
     steps |= {f"down {i}": up for i, up in enumerate(downs)}
-    before = dict(zip(steps, ["beside", *steps], strict=False))
+    near, ready = partial(beside, out=-GAP, up=0.0), "felt" if felt else "beside"
+    feel = (
+        go("near", near, near=pi, until=touches, pace=GENTLE, after=(f"{other}.beside",)),
+        go("felt", touched, near=pi, steps=1),
+    )
+    before = dict(zip(steps, [ready, *steps], strict=False))
     return (
         go("over", partial(beside, out=GAP, up=OVER), near=0.05),
         go("beside", partial(beside, out=GAP, up=0.0), near=0.03),
+        *(feel if felt else ()),
         *(step(name, up, before[name]) for name, up in steps.items()),
         go(
             "leave",

@@ -11,6 +11,9 @@ from robot_layouts.kinematics.rotations import Floats
 from tasks import TaskEnv
 from tasks.cells.take_sides import SIDES, CellTakeSides
 
+# Strokes of a push, how far behind its block it begins (m), and whether a lost one is pushed again
+TRIED = ((12, 0.1, False), (18, 0.09, False), (12, 0.1, True))
+
 
 def take_sides(task: TaskEnv, seed: int) -> Plan:
     """Return the actions of all arms, (T, A), that push the blocks to their sides."""
@@ -19,7 +22,7 @@ def take_sides(task: TaskEnv, seed: int) -> Plan:
     def mark(scene: Scene, name: str) -> Floats:
         return scene.body(name)[0]
 
-    def script(strokes: int, gap: float) -> Script:
+    def script(strokes: int, gap: float, again: bool) -> Script:
         return {
             arm: push(
                 task,
@@ -28,10 +31,11 @@ def take_sides(task: TaskEnv, seed: int) -> Plan:
                 partial(mark, name=f"{side}_{arm}"),
                 strokes=strokes,
                 gap=gap,
+                again=again,
             )
             for arm, side in zip(task.layout.arms, sides, strict=True)
         }
 
     return first_success(
-        task, seed, lambda scene: [script(12, 0.1), script(18, 0.09)], as_declared=True
+        task, seed, lambda scene: [script(*tried) for tried in TRIED], as_declared=True
     )

@@ -28,6 +28,7 @@ DIP = 0.02  # m below the TCP that fingers may reach, wherever tips go
 LEAST = 0.012  # m; of a stroke, unless less is left
 PRESSED = 8  # control steps that pressing takes, however far the tip comes
 BEYOND = 0.15  # m behind its end, where a push aims; so it stays steady near the end
+LOST = 0.03  # m from its end, at which a block is pushed once more
 
 
 def push(
@@ -40,12 +41,13 @@ def push(
     strokes: int = 10,
     height: float = 0.025,
     after: Sequence[str] = (),
+    again: bool = False,
 ) -> tuple[Waypoint, ...]:
     """Return the waypoints with which a tip pushes a block to a place, aiming at every stroke.
 
-    They are ``above``, ``behind``, ``push 0`` …, ``back`` and ``away``, with the block's name. What
-    a flat tip pushes moves as the tip does, which goes the way that the block has to; round ones
-    slip, and get behind the block anew.
+    They are ``above``, ``behind``, ``push 0`` …, ``back`` and ``away``, with the block's name, and
+    with ``again`` after it those of a second push. What a flat tip pushes moves as the tip does,
+    which goes the way that the block has to; round ones slip, and get behind the block anew.
 
     Args:
         task: Says where the arm stands.
@@ -56,8 +58,26 @@ def push(
         strokes: In how many parts it is pushed.
         height: Of the TCP over the table (m), or more where fingers reach farther down.
         after: Waypoints of other arms that come before.
+        again: Whether it pushes a second time a block that it has lost on the way.
     """
-    go = partial(over_table, task, robot, leans=PUSHING, farther=FAR)
+    pushing = partial(_push, task, robot, body, end, gap, strokes, height)
+    first = pushing(body, after, [True])
+    return (*first, *pushing(f"{body} again", (), [])) if again else first
+
+
+def _push(
+    task: TaskEnv,
+    robot: str,
+    body: str,
+    end: Place,
+    gap: float,
+    strokes: int,
+    height: float,
+    called: str,
+    after: Sequence[str],
+    needed: list[bool],
+) -> tuple[Waypoint, ...]:
+    """Return the waypoints of one push; unless it is needed, or turns out to be, the tip stays."""
     arm = task.layout.arm(robot).robot
     flat = driven_gripper(arm) is not None and not may_swing(arm)
     line: list[Floats] = []  # where it aims
@@ -69,6 +89,15 @@ def push(
             line.append(goal + BEYOND * (goal - place) / np.linalg.norm(goal - place))
         away = place - line[0]
         return line[0], away / np.linalg.norm(away)
+
+    def go(name: str, place: Place, **more: Any) -> Waypoint:
+        def where(scene: Scene) -> Floats:
+            if not needed:
+                away = (scene.body(body)[0] - end(scene))[:2]
+                needed.append(bool(np.linalg.norm(away) > LOST))
+            return place(scene) if needed[0] else scene.tcp(robot)[0]
+
+        return over_table(task, robot, name, where, leans=PUSHING, farther=FAR, **more)
 
     def behind(scene: Scene, up: float) -> Floats:
         return np.array([*(scene.body(body)[0][:2] + gap * aim(scene)[1]), up])
@@ -84,14 +113,14 @@ def push(
         return np.array([*(scene.tcp(robot)[0][:2] + 0.06 * aim(scene)[1]), up])
 
     return (
-        go(f"above {body}", partial(behind, up=HIGH), near=0.05, after=tuple(after)),
-        go(f"behind {body}", partial(behind, up=height), near=0.03),
+        go(f"above {called}", partial(behind, up=HIGH), near=0.05, after=tuple(after)),
+        go(f"behind {called}", partial(behind, up=height), near=0.03),
         *(
-            go(f"push {body} {i}", partial(along, left=strokes - i), near=0.03, pushes=True)
+            go(f"push {called} {i}", partial(along, left=strokes - i), near=0.03, pushes=True)
             for i in range(strokes)
         ),
-        go(f"back {body}", partial(back, up=height), near=0.1),
-        go(f"away {body}", partial(back, up=HIGH), near=0.1),
+        go(f"back {called}", partial(back, up=height), near=0.1),
+        go(f"away {called}", partial(back, up=HIGH), near=0.1),
     )
 
 
