@@ -80,7 +80,8 @@ def cells(
     """
     torch.set_num_threads(1)
     record = read_record(out, versions={}, cells={}, pairs={}, mixed={}, elsewhere={})
-    chosen = _of_the_library() if tasks is None else tasks
+    fitting = [task for task in cells_of_the_library() if get_task_class(task).fits()]
+    chosen = fitting if tasks is None else tasks
     for task, label, named, kept in tqdm([*_cases(chosen, robots, pairs, elsewhere)], disable=None):
         seen = (
             record[kept].setdefault(task, {}).setdefault(label, {"robots": named, "episodes": {}})
@@ -117,14 +118,10 @@ def cells(
     return 0
 
 
-def _of_the_library() -> list[str]:
-    """Return the cells that fit their robots, but for those that a program has added."""
-    every = {task: get_task_class(task) for task in list_tasks()}
-    return [
-        name
-        for name, cls in every.items()
-        if cls.fits() and cls.__module__.startswith("tasks.cells")
-    ]
+def cells_of_the_library() -> list[str]:
+    """Return all cells but those that a program has added."""
+    modules = {task: get_task_class(task).__module__ for task in list_tasks()}
+    return [task for task, module in modules.items() if module.startswith("tasks.cells")]
 
 
 def _cases(

@@ -12,6 +12,7 @@ from shutil import rmtree
 import torch
 from tqdm import tqdm
 
+from benchmarks.cells import cells_of_the_library
 from benchmarks.records import (
     DOCS,
     Record,
@@ -27,7 +28,6 @@ from robot_layouts.data.playing.executor import ProcessExecutor
 from robot_layouts.data.reading.recording import Recording
 from robot_layouts.data.recipe import recipe_text
 from robot_layouts.data.recording.record import record
-from tasks import list_tasks
 
 MB = 1e6
 
@@ -44,7 +44,7 @@ def datasets(
     Args:
         tasks: Task ids; all cells if not given. Those in the record are not recorded again.
         episodes: Of each task.
-        work: Folder of the recordings; each is removed once it is certified.
+        work: Folder of the recordings; each is begun anew, and removed once it is certified.
         out: The record; the page is beside it, and a folder of recipes.
 
     Raises:
@@ -52,7 +52,7 @@ def datasets(
     """
     torch.set_num_threads(1)
     found = read_record(out, versions={}, tasks={})
-    names = [name for name in list_tasks() if name.startswith("Cell")] if tasks is None else tasks
+    names = cells_of_the_library() if tasks is None else tasks
     for task in tqdm([name for name in names if name not in found["tasks"]], disable=None):
         recipe = out.with_suffix("") / f"{task.removesuffix('-v1')}.yaml"
         found["tasks"][task] = _certified(task, episodes, work / task, recipe)
@@ -66,6 +66,7 @@ def datasets(
 
 def _certified(task: str, episodes: int, folder: Path, recipe: Path) -> Record:
     """Record a cell, certify that, and return what is known of it; its recipe is written."""
+    rmtree(folder, ignore_errors=True)  # to go on would count the seconds of some episodes alone
     begun = time.process_time()
     record(task, range(episodes), folder, workers=0)
     spent = time.process_time() - begun
@@ -77,18 +78,19 @@ def _certified(task: str, episodes: int, folder: Path, recipe: Path) -> Record:
     seen = certify(folder, ProcessExecutor(1))
     rmtree(folder)
     return {
-        "episodes": seen.episodes,
+        "episodes": episodes,
+        "recorded": seen.episodes,
         "solved": seen.successes,
         "equal": seen.equal,
         "touching": seen.arm_contacts.episodes,
-        "steps": round(steps / episodes),
+        "steps": round(steps / seen.episodes),
         "seconds": round(spent / episodes, 1),
         "MB": round(size / MB, 1),
     }
 
 
 def _row(folder: str, task: str, seen: Record) -> tuple[str, ...]:
-    name, whole = task.removesuffix("-v1"), seen["episodes"]
-    shares = (f"{seen[key]} of {whole}" for key in ("solved", "equal"))
+    name = task.removesuffix("-v1")
+    shares = (f"{seen['solved']} of {seen['episodes']}", f"{seen['equal']} of {seen['recorded']}")
     rest = (str(seen[key]) for key in ("touching", "steps", "seconds", "MB"))
     return (f"[{name}]({folder}/{name}.yaml)", *shares, *rest)

@@ -101,7 +101,7 @@ class Scene:
         """Return whether a robot's hand touches a body, with its tip or with what surrounds that.
 
         Args:
-            robot: An arm: what its last joint moves is its hand, the gripper included.
+            robot: An arm; its hand is what its last joint moves, the gripper included.
             body: The body.
         """
         arm, owner = self._layout.arm(robot).robot, self._layout.owner(robot)

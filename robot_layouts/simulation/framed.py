@@ -135,7 +135,7 @@ class FramedState(State):
 
     @property
     def scale(self) -> float:
-        """How long 1 m of its lengths is in the world (m)."""
+        """How long in the world what the state calls 1 m is (m)."""
         return self._scale
 
 

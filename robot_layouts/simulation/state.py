@@ -119,7 +119,7 @@ class State:
 
     @property
     def scale(self) -> float:
-        """How long 1 m of its lengths is in the world (m): other than 1 in a fitted task."""
+        """How long in the world what the state calls 1 m is (m); 1 unless a task is fitted."""
         return 1.0
 
     def lost(self) -> Lost | None:

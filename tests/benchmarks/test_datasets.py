@@ -16,6 +16,7 @@ def test_a_cell_is_certified_and_its_recipe_makes_it_again(tmp_path, capsys):
     made = ["datasets", "--tasks", TASK, "--episodes", "2", "--work", str(work), "--out", str(out)]
     assert main(made) == 0
     seen = json.loads(out.read_text())["tasks"][TASK]
+    assert seen["recorded"] == 2
     assert (seen["episodes"], seen["solved"], seen["equal"], seen["touching"]) == (2, 2, 2, 0)
     assert seen["seconds"] > 0
     assert not (work / TASK).exists()

@@ -22,10 +22,16 @@ HELD = 0.085  # m; height of the tips when they press: hands stay above the box
 LEANS = (0.15, 0.3, 0.45, 0.6)  # of tips that do not reach there upright (rad)
 LEGS, RAISED = 5, HIGH + 0.04  # in how many steps it is lifted, and how far (m)
 OVER_PLINTH = {"down 0": 0.5}  # how far of its way over the plinth the box goes; then all of it
-# How deep tips press (m), and strokes of the push. Where a flange, or fingers, reach out farther
-# than the tip, that is too deep: then tips come near until they touch, and press from there on.
-TRIED = ((0.012, 28), (0.012, 36), (0.008, 24))
-FELT = ((0.012, 28), (0.006, 28), (0.02, 36))
+# How deep tips press (m), strokes of the push, and whether tips first come near until they touch,
+# and press from there on: needed where flanges or fingers reach out beyond the tip.
+TRIED = (
+    (0.012, 28, False),
+    (0.012, 36, False),
+    (0.008, 24, False),
+    (0.012, 28, True),
+    (0.006, 28, True),
+    (0.02, 36, True),
+)
 GENTLE = 0.1  # share of its greatest speed at which a tip comes near
 
 
@@ -38,16 +44,12 @@ def squeeze_box(task: TaskEnv, seed: int) -> Plan:
     return first_success(
         task,
         seed,
-        lambda scene: [
-            _script(task, deep, strokes, felt=felt)
-            for felt, tried in ((False, TRIED), (True, FELT))
-            for deep, strokes in tried
-        ],
+        lambda scene: [_script(task, *tried) for tried in TRIED],
         as_declared=True,
     )
 
 
-def _script(task: TaskEnv, deep: float, strokes: int, *, felt: bool) -> Script:
+def _script(task: TaskEnv, deep: float, strokes: int, felt: bool) -> Script:
     start: list[Floats] = []  # where the box stood
 
     def under(scene: Scene) -> Floats:
@@ -58,12 +60,12 @@ def _script(task: TaskEnv, deep: float, strokes: int, *, felt: bool) -> Script:
     )
     return {
         "pusher": (*pushing, stand_back(task, "pusher")),
-        **{arm: _pressing(task, arm, deep, start, felt=felt) for arm in SIDES},
+        **{arm: _pressing(task, arm, deep, start, felt) for arm in SIDES},
     }
 
 
 def _pressing(
-    task: TaskEnv, arm: str, deep: float, start: list[Floats], *, felt: bool
+    task: TaskEnv, arm: str, deep: float, start: list[Floats], felt: bool
 ) -> tuple[Waypoint, ...]:
     (other,) = (each for each in SIDES if each != arm)
     side = [0.0]  # how far outside the box's side its tip is when it touches that (m)

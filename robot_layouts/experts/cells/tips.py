@@ -61,8 +61,8 @@ def push(
         again: Whether it pushes a second time a block that it has lost on the way.
     """
     pushing = partial(_push, task, robot, body, end, gap, strokes, height)
-    first = pushing(body, after, [True])
-    return (*first, *pushing(f"{body} again", (), [])) if again else first
+    more = pushing(f"{body} again", once_lost=True) if again else ()
+    return (*pushing(body, after), *more)
 
 
 def _push(
@@ -74,13 +74,15 @@ def _push(
     strokes: int,
     height: float,
     called: str,
-    after: Sequence[str],
-    needed: list[bool],
+    after: Sequence[str] = (),
+    *,
+    once_lost: bool = False,
 ) -> tuple[Waypoint, ...]:
-    """Return the waypoints of one push; unless it is needed, or turns out to be, the tip stays."""
+    """Return the waypoints of one push; with ``once_lost``, the tip stays if the block is there."""
     arm = task.layout.arm(robot).robot
     flat = driven_gripper(arm) is not None and not may_swing(arm)
     line: list[Floats] = []  # where it aims
+    lost: list[bool] = []  # whether the block was, as the push began
 
     def aim(scene: Scene) -> tuple[Floats, Floats]:
         """Return where the push aims, and the way from there to the block, of length 1."""
@@ -92,10 +94,9 @@ def _push(
 
     def go(name: str, place: Place, **more: Any) -> Waypoint:
         def where(scene: Scene) -> Floats:
-            if not needed:
-                away = (scene.body(body)[0] - end(scene))[:2]
-                needed.append(bool(np.linalg.norm(away) > LOST))
-            return place(scene) if needed[0] else scene.tcp(robot)[0]
+            away = np.linalg.norm((scene.body(body)[0] - end(scene))[:2])
+            lost[:] = lost or [not once_lost or bool(away > LOST)]
+            return place(scene) if lost[0] else scene.tcp(robot)[0]
 
         return over_table(task, robot, name, where, leans=PUSHING, farther=FAR, **more)
 
